@@ -10,7 +10,8 @@ use clap::{
 use intrados_light::{Shard, Sides};
 use intrados_mechanics::read::Units;
 use intrados_scene::{
-    attach::{Along, Face, Kind},
+    AxisRuns,
+    attach::{Along, Face, Kind, VoxelType},
     structure::{Course, Date, Electrode},
 };
 use intrados_transport::{Estimator, Roulette, Steering};
@@ -255,7 +256,8 @@ pub(crate) struct Attach {
     pub(crate) project: PathBuf,
     /// Id or name of the member
     pub(crate) member: String,
-    /// CT slices of one core (.tif, .png, .mha), or one table (.csv, .tsv, .txt)
+    /// CT slices or a volume of one core (.tif, .png, .mha, .dcm; others with --raw), or one table
+    /// (.csv, .tsv, .txt)
     #[arg(value_name = "FILE", conflicts_with = "finding", required_unless_present = "finding")]
     pub(crate) files: Vec<PathBuf>,
     /// Name, unique within the member; made of its kind or file if absent
@@ -265,6 +267,8 @@ pub(crate) struct Attach {
     pub(crate) place: PlaceArgs,
     #[command(flatten)]
     pub(crate) of_file: FileArgs,
+    #[command(flatten)]
+    pub(crate) stack: StackArgs,
     #[command(flatten)]
     pub(crate) load: LoadTestArgs,
     #[command(flatten)]
@@ -294,6 +298,9 @@ pub(crate) struct PlaceArgs {
     /// What it was measured with
     #[arg(long, value_name = "NAME")]
     pub(crate) instrument: Option<String>,
+    /// A photograph of a finding (.jpg, .png) for the report
+    #[arg(long, value_name = "FILE", requires = "finding", conflicts_with = "files")]
+    pub(crate) picture: Option<PathBuf>,
 }
 
 // What a file does not say itself.
@@ -312,6 +319,64 @@ pub(crate) struct FileArgs {
     /// CT slices: edge of a pixel, mm; what the files tell if absent
     #[arg(long, value_name = "MM", requires = "files", conflicts_with = "finding")]
     pub(crate) pixel_mm: Option<f32>,
+}
+
+// Slices that lie behind each other.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "A volume of CT slices")]
+pub(crate) struct StackArgs {
+    /// The files are one volume: its slices lie behind each other, and it is read across and along
+    #[arg(long, requires = "files", conflicts_with = "finding")]
+    pub(crate) stack: bool,
+    /// Edges of a voxel, mm: to the right, down, from slice to slice; what the files tell if absent
+    #[arg(long, value_name = "X,Y,Z", requires = "files", value_parser = triple::<f32>)]
+    pub(crate) voxel_mm: Option<Triple<f32>>,
+    /// The file is bare voxels, so many to the right, down, and slices
+    #[arg(long, value_name = "X,Y,Z", requires = "files", value_parser = triple::<u32>)]
+    pub(crate) raw: Option<Triple<u32>>,
+    /// What a bare voxel is: u8, i8, u16, i16, u32, i32, f32 or f64
+    #[arg(long, value_name = "TYPE", requires = "raw", default_value = "u16",
+        value_parser = |text: &str| text.parse::<VoxelType>())]
+    pub(crate) voxel_type: VoxelType,
+    /// Bytes before the first bare voxel
+    #[arg(long, value_name = "N", requires = "raw", default_value_t = 0)]
+    pub(crate) skip_bytes: u64,
+    /// Bare voxels have their highest byte first
+    #[arg(long, requires = "raw")]
+    pub(crate) big_endian: bool,
+    /// Which way the member's axis runs in CT slices: to the right, down, or through them
+    #[arg(long, value_enum, requires = "files", conflicts_with = "finding")]
+    pub(crate) axis: Option<AxisArg>,
+}
+
+/// Three numbers with commas.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Triple<T>(pub(crate) [T; 3]);
+
+fn triple<T: std::str::FromStr + Copy>(text: &str) -> Result<Triple<T>, String> {
+    let all: Result<Vec<T>, _> = text.split([',', 'x', '×']).map(|n| n.trim().parse()).collect();
+    match all.as_deref() {
+        Ok(&[x, y, z]) => Ok(Triple([x, y, z])),
+        _ => Err("write three numbers with commas, such as 512,512,400".into()),
+    }
+}
+
+/// Which way a member's axis runs in pictures of its inside.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum AxisArg {
+    Right,
+    Down,
+    Through,
+}
+
+impl From<AxisArg> for AxisRuns {
+    fn from(axis: AxisArg) -> Self {
+        match axis {
+            AxisArg::Right => Self::Right,
+            AxisArg::Down => Self::Down,
+            AxisArg::Through => Self::Through,
+        }
+    }
 }
 
 // A load test under which gauges are read.
@@ -895,6 +960,9 @@ pub(crate) struct Predict {
     /// Seed of the pictures
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub(crate) seed: u64,
+    /// The IFC model that the scene was imported from: a copy gets the results as property sets
+    #[arg(long, value_name = "MODEL")]
+    pub(crate) ifc: Option<PathBuf>,
     /// Folder for the report and its tables
     #[arg(long, value_name = "DIR", default_value = "out")]
     pub(crate) out: PathBuf,

@@ -170,6 +170,7 @@ impl From<RecordError> for Failure {
     fn from(error: RecordError) -> Self {
         match error {
             RecordError::Write(error) => error.into(),
+            RecordError::Model(error) => error.into(),
             RecordError::Cancelled(cancelled) => cancelled.into(),
         }
     }

@@ -307,10 +307,11 @@ fn the_report_is_whole_and_escapes_names() {
         &scene,
         &mut document,
         &[picture],
+        None,
         &intrados_report::Provenance::default(),
     )
     .unwrap();
-    assert_eq!(files.len(), 9);
+    assert_eq!(files.len(), 10);
     let html = std::fs::read_to_string(folder.path().join("report.html")).unwrap();
     for text in [
         drawn::MARK,

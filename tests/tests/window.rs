@@ -420,7 +420,7 @@ fn a_prediction_goes_on_while_the_picture_is_paused_and_is_saved_as_by_predict()
     window.frames(2);
     window.click("Save report");
     window.until("the report", |w| {
-        w.resource::<Log>().lines().iter().any(|line| line.starts_with("wrote 11 files"))
+        w.resource::<Log>().lines().iter().any(|line| line.starts_with("wrote 12 files"))
     });
     let mut names: Vec<_> = std::fs::read_dir(&out)
         .expect("a folder")
@@ -429,6 +429,7 @@ fn a_prediction_goes_on_while_the_picture_is_paused_and_is_saved_as_by_predict()
     names.sort();
     let expected = [
         "damage.bcf",
+        "damage-3.0.bcf",
         "damage.glb",
         "damage.vtu",
         "defects.csv",

@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use intrados_ct::source::SliceSource;
+use intrados_ct::{Picture, source::SliceSource};
 use intrados_scene::{
-    attach::{Attachment, Finding, Listed, Project, Proposal, What},
+    attach::{Attachment, Cut, Finding, Listed, Project, Proposal, Raw, What},
     structure::{Course, Electrode},
 };
 use serde::Serialize;
@@ -100,8 +100,23 @@ fn attachment(args: &args::Attach) -> Result<Attachment, Failure> {
         angle_deg: place.angle,
         height_m: place.height,
         instrument: place.instrument.clone(),
+        picture: picture(place.picture.as_deref())?,
         what: what(args)?,
     })
+}
+
+/// A photograph that the report can show.
+fn picture(file: Option<&Path>) -> Result<Option<PathBuf>, Failure> {
+    let Some(file) = file else { return Ok(None) };
+    let ending = file.extension().unwrap_or_default().to_ascii_lowercase();
+    let bad = |why| Failure::BadInput(format!("{}: {why}", file.display()));
+    match ["jpg", "jpeg", "png"].iter().any(|known| ending == *known) {
+        false => Err(bad("is neither a JPEG nor a PNG: convert it")),
+        true if file.is_file() && Picture::read(file, 8).is_none() => {
+            Err(bad("is no picture, or larger than 20 000 pixels: save it again"))
+        }
+        true => Ok(Some(file.to_owned())),
+    }
 }
 
 fn what(args: &args::Attach) -> Result<What, Failure> {
@@ -123,11 +138,14 @@ fn what(args: &args::Attach) -> Result<What, Failure> {
         return single(f, finding);
     }
     none_of(&[(f.std_error.is_some(), "--std-error is of a finding; a table has its column")])?;
+    if args.stack.raw.is_some() {
+        return slices(args, &args.files);
+    }
     let kinds: Vec<Option<bool>> = args.files.iter().map(|file| What::is_table(file)).collect();
     if let Some(other) = kinds.iter().position(Option::is_none) {
         let file = args.files[other].display();
         return Err(Failure::BadInput(format!(
-            "{file}: is neither a table (.csv, .tsv, .txt) nor a CT slice (.tif, .png, .mha): convert it"
+            "{file}: is neither a table (.csv, .tsv, .txt) nor CT slices (.tif, .png, .mha, .dcm): convert it, or give the --raw size of bare voxels"
         )));
     }
     match &args.files[..] {
@@ -183,6 +201,9 @@ fn single(f: &FindingArgs, finding: Finding) -> Result<What, Failure> {
 fn table(args: &args::Attach, file: &Path) -> Result<What, Failure> {
     let (f, of) = (&args.finding, &args.of_file);
     none_of(&[
+        (args.stack.stack, "--stack is of CT slices"),
+        (args.stack.voxel_mm.is_some(), "--voxel-mm is of CT slices"),
+        (args.stack.axis.is_some(), "--axis is of CT slices"),
         (f.depth_mm.is_some(), "--depth-mm is of CT slices or of a --spall"),
         (f.diameter_mm.is_some(), "--diameter-mm is of CT slices or of a --core-strength"),
         (of.pixel_mm.is_some(), "--pixel-mm is of CT slices"),
@@ -197,25 +218,42 @@ fn table(args: &args::Attach, file: &Path) -> Result<What, Failure> {
 }
 
 fn slices(args: &args::Attach, files: &[PathBuf]) -> Result<What, Failure> {
-    let (f, of) = (&args.finding, &args.of_file);
+    let (f, of, stack) = (&args.finding, &args.of_file, &args.stack);
     none_of(&[
         (of.unit.is_some(), "--unit is of a table"),
         (of.kind.is_some(), "--kind is of a table"),
         (of.test.is_some(), "--test is of a table"),
         (f.electrode.is_some(), "--electrode is of a --half-cell or of a table"),
         (args.place.height.is_some(), "--height is of a finding; slices have --along"),
-        (args.place.date.is_some(), "--date is of a finding or of a table"),
         (args.place.instrument.is_some(), "--instrument is of a finding or of a table"),
+        (
+            of.pixel_mm.is_some() && (stack.stack || stack.raw.is_some()),
+            "--pixel-mm is of single slices; a volume has --voxel-mm",
+        ),
+        (
+            stack.voxel_mm.is_some() && !stack.stack && stack.raw.is_none(),
+            "--voxel-mm is of a volume (--stack); single slices have --pixel-mm",
+        ),
     ])?;
     if args.place.along.is_some_and(|a| a.0[0].to_bits() != a.0[1].to_bits()) {
         return Err(Failure::Usage("--along: a core lies at one place, such as 0.3".into()));
     }
-    Ok(What::Slices {
-        files: files.to_vec(),
-        pixel_mm: of.pixel_mm,
+    let cut = Cut {
         depth_m: f.depth_mm.map(|mm| (1e-3 * mm) as f32),
         diameter_mm: f.diameter_mm.map(|mm| mm as f32),
-    })
+        axis: stack.axis.map(Into::into),
+    };
+    let files = files.to_vec();
+    if !stack.stack && stack.raw.is_none() {
+        return Ok(What::Slices { files, pixel_mm: of.pixel_mm, cut });
+    }
+    let raw = stack.raw.map(|size| Raw {
+        size: size.0,
+        voxel: stack.voxel_type,
+        skip: stack.skip_bytes,
+        big_endian: stack.big_endian,
+    });
+    Ok(What::Stack { files, voxel_mm: stack.voxel_mm.map(|v| v.0), raw, cut })
 }
 
 /// Whether a finding is measured with an error.

@@ -208,7 +208,7 @@ impl MemberSummary {
             scene.objects.iter().filter(|o| o.member == Some(index) && o.part == part).count()
         };
         let slices = |s: &Slices| match s {
-            Slices::Files { images, .. } => images.len(),
+            Slices::Files { images, .. } | Slices::Stack { images, .. } => images.len(),
             Slices::Drawn { count, .. } => *count as usize,
             Slices::Scanned { along, .. } => along.len(),
         };

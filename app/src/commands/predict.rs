@@ -11,7 +11,7 @@ use intrados_damage::{
     predict::PredictSettings,
 };
 use intrados_light::{LitScene, plugin::Lit};
-use intrados_report::{Document, Record};
+use intrados_report::{Document, Record, check_model};
 use intrados_scene::{Scene, plugin::install};
 use intrados_stage::{Jobs, Pace};
 
@@ -26,6 +26,9 @@ use crate::{
 
 pub(crate) fn run(session: &Session, args: &args::Predict) -> Result<Outcome, Failure> {
     let scene = walks::load(session, &args.scene)?;
+    if let Some(model) = &args.ifc {
+        check_model(model, &scene)?;
+    }
     let settings = PredictSettings {
         detect: detect::DetectSettings {
             method: args.method.into(),
@@ -50,8 +53,12 @@ pub(crate) fn run(session: &Session, args: &args::Predict) -> Result<Outcome, Fa
     let (parts, document) = output::in_shared_parts(session, &args.out, &key, |parts| {
         let (prediction, lit) = predicted(session, scene, settings.clone(), parts)?;
         let _progress = session.watch("the report");
-        let record =
-            Record { command: command(std::env::args_os()), samples: args.spp, seed: args.seed };
+        let record = Record {
+            command: command(std::env::args_os()),
+            samples: args.spp,
+            seed: args.seed,
+            ifc: args.ifc.clone(),
+        };
         Ok(record.make(&args.out, &lit, prediction, &session.job)?)
     })?;
     output::locked(&parts).forget();

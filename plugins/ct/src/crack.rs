@@ -77,6 +77,8 @@ pub struct Crack {
     pub width_mm: f64,
     /// Its middle pixel, mm from the left and top edges.
     pub at_mm: [f64; 2],
+    /// Width and height of the box about it, mm.
+    pub box_mm: [f64; 2],
 }
 
 /// The cracks of a slice, and which pixels are theirs.
@@ -119,11 +121,21 @@ impl Found {
     fn take(&mut self, shape: Shape, width_px: f64, pixels: &[usize], pixel_mm: f32) {
         let mm = f64::from(pixel_mm);
         let (x, y) = self.mask.place(shape.middle);
+        let side = |place: &dyn Fn(usize) -> usize| {
+            let span = pixels
+                .iter()
+                .map(|&i| place(i))
+                .fold([usize::MAX, 0], |[a, b], v| [a.min(v), b.max(v)]);
+            (span[1] + 1).saturating_sub(span[0]) as f64 * mm
+        };
+        let width = self.mask.width;
+        let box_mm = [side(&|i| i % width), side(&|i| i / width)];
         self.list.push(Crack {
             length_px: shape.length,
             length_mm: shape.length * mm,
             width_mm: width_px * mm,
             at_mm: [(x as f64 + 0.5) * mm, (y as f64 + 0.5) * mm],
+            box_mm,
         });
         pixels.iter().for_each(|&i| self.mask.data[i] = true);
     }

@@ -12,6 +12,7 @@ pub mod picture;
 pub mod score;
 pub mod slice;
 pub mod source;
+mod stack;
 pub mod steel;
 pub mod synthetic;
 

@@ -1,13 +1,19 @@
 //! Slices as pictures for people.
 
-use std::io::Cursor;
+use std::{
+    io::{BufReader, Cursor},
+    path::Path,
+};
 
 use base64::{Engine, engine::general_purpose::STANDARD};
 
+use image::ImageDecoder;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+use intrados_stage::access;
 use serde::{Deserialize, Serialize};
 
 use crate::{
+    crack::Crack,
     detect::Detection,
     grid::{Grid, Mask},
 };
@@ -49,8 +55,32 @@ pub const MISSED: [u8; 3] = [170, 40, 190];
 
 /// Longer side of the pictures that are made here, pixels.
 const SIDE: usize = 520;
+/// Longest side of a photograph that is unpacked, pixels.
+const MOST_SIDE: u32 = 20_000;
+/// That of the pictures of single cracks.
+const SMALL: usize = 150;
 
 impl Picture {
+    /// Reads a photograph (JPEG, PNG), its longer side at most `side` pixels. None where it is
+    /// missing, damaged, or too large to be unpacked.
+    #[must_use]
+    pub fn read(path: &Path, side: u32) -> Option<Self> {
+        let (file, _) = access::open(path).ok()?;
+        let mut reader =
+            image::ImageReader::new(BufReader::new(file)).with_guessed_format().ok()?;
+        let mut limits = image::Limits::default();
+        limits.max_image_width = Some(MOST_SIDE);
+        limits.max_image_height = Some(MOST_SIDE);
+        reader.limits(limits);
+        let mut decoder = reader.into_decoder().ok()?;
+        let turned = decoder.orientation().ok();
+        let mut whole = image::DynamicImage::from_decoder(decoder).ok()?;
+        turned.into_iter().for_each(|turn| whole.apply_orientation(turn));
+        let small = whole.thumbnail(side, side).to_rgb8();
+        let [width, height] = [small.width(), small.height()].map(|n| n as usize);
+        Some(Self { width, height, rgb: small.into_raw(), caption: String::new() })
+    }
+
     /// As a PNG, grey if all of it is; `None` if the bytes do not fit the size.
     pub fn png(&self) -> Option<Vec<u8>> {
         let is_grey = self.rgb.chunks_exact(3).all(|p| p[0] == p[1] && p[1] == p[2]);
@@ -79,6 +109,27 @@ impl Picture {
 /// where the truth is known), both cut to the body.
 pub fn slice_pictures(found: &Detection, truth: Option<&Mask>) -> [Picture; 2] {
     let view = View::of(&found.body);
+    drawn(found, truth, &view)
+}
+
+/// One crack with its outline and what is about it.
+#[must_use]
+pub fn crack_picture(found: &Detection, crack: &Crack) -> Picture {
+    let pixel = f64::from(found.pixel_mm);
+    let [at, size] = [crack.at_mm, crack.box_mm].map(|mm| mm.map(|v| v / pixel));
+    // Its box need not lie about its middle pixel: twice its longer side shows all of it.
+    let half = size[0].max(size[1]).max(20.0);
+    let all = [found.grey.width, found.grey.height];
+    let from = [0, 1].map(|k| (at[k] - half).clamp(0.0, all[k] as f64 - 1.0) as usize);
+    let to = [0, 1].map(|k| ((at[k] + half) as usize).clamp(from[k] + 1, all[k]));
+    let size = [to[0] - from[0], to[1] - from[1]];
+    let scale = SMALL as f64 / size[0].max(size[1]) as f64;
+    let [_, overlay] = drawn(found, None, &View { from, size, scale, width: all[0] });
+    overlay
+}
+
+/// A window of a slice as it is, and with outlines.
+fn drawn(found: &Detection, truth: Option<&Mask>, view: &View) -> [Picture; 2] {
     let level = |v: f32| (v * 190.0).clamp(0.0, 255.0) as u8;
     let grey = |i: usize| if found.body.data[i] { level(found.grey.data[i]) } else { 255 };
     let kind = |i: usize| match found.labels.data[i] {

@@ -125,7 +125,9 @@ impl Slices {
             1 => self.read(0),
             n => Err(VolumeError::bad(
                 &self.path,
-                format!("holds {n} slices; save each as a file of its own"),
+                format!(
+                    "holds {n} slices: they are a volume, a Stack of the scene (attach it with --stack)"
+                ),
             )),
         }
     }

@@ -3,12 +3,12 @@
 
 use std::{
     path::{Path, PathBuf},
-    sync::{Arc, Mutex, PoisonError},
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
 };
 
-use intrados_scene::{Drilled, Scene, Slices};
+use intrados_scene::{AxisRuns, Drilled, Scene, Slices};
 use intrados_stage::Job;
-use intrados_xray::volume::VolumeError;
+use intrados_xray::volume::{Reader, VolumeError};
 use serde::{Deserialize, Serialize};
 
 use crate::{
@@ -17,6 +17,7 @@ use crate::{
     detect::{DetectSettings, Detection, detect},
     grid::Mask,
     slice::{self, PixelFrom, Slice, read_masks},
+    stack::{self, Normal, Plane, Section},
     synthetic::{
         drawn,
         scanned::{self, Layer},
@@ -63,6 +64,7 @@ pub struct SliceSource {
 enum What {
     File { image: PathBuf, masks: Vec<PathBuf>, pixel_mm: Option<f32>, drilled: Drilled },
     Drawn(drawn::Request),
+    Stack { images: Arc<[PathBuf]>, voxel_mm: Option<[f32; 3]>, plane: Plane, drilled: Drilled },
     Scanned(scanned::Request),
 }
 
@@ -77,6 +79,8 @@ pub struct SliceRead {
     pub known: Option<Known>,
     /// What the file's own tags say of its pixels, where that contradicts the scene.
     pub doubt: Option<String>,
+    /// From the place of its source to its own, along the member's axis, m.
+    pub offset_m: f64,
 }
 
 /// What is known of a slice beforehand.
@@ -90,9 +94,21 @@ pub enum Known {
     Labels(Mask),
 }
 
-/// What was scanned of a scene, since a scan takes half a minute. Clones share it.
+/// What was scanned of a scene, since a scan takes half a minute, and the sections of the volume
+/// that was cut last. Clones share it.
 #[derive(Debug, Clone, Default)]
-pub struct ScanShelf(Arc<Mutex<(String, Vec<Ordered>)>>);
+pub struct SliceShelf(Arc<Mutex<Shelf>>);
+
+#[derive(Debug, Default)]
+struct Shelf {
+    /// Hash of the scene that all of it is of.
+    scene: String,
+    scanned: Vec<Ordered>,
+    cut: Option<(Arc<[PathBuf]>, Sections)>,
+}
+
+/// Sections along [`Plane::all`].
+type Sections = Arc<Vec<Option<Section>>>;
 
 /// What was scanned of a member.
 #[derive(Debug)]
@@ -102,7 +118,7 @@ struct Ordered {
     layer: Arc<Layer>,
 }
 
-impl ScanShelf {
+impl SliceShelf {
     /// From the shelf, or scanned and put there.
     fn fetch(
         &self,
@@ -111,21 +127,41 @@ impl ScanShelf {
         request: &scanned::Request,
         job: &Job,
     ) -> Result<Arc<Layer>, SliceError> {
-        let shelf = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if let (hash, ordered) = &*shelf()
-            && *hash == scene.hash
-            && let Some(found) =
-                ordered.iter().find(|o| o.member == member && o.request == *request)
-        {
+        let is_it = |o: &&Ordered| o.member == member && o.request == *request;
+        if let Some(found) = self.of(scene).scanned.iter().find(is_it) {
             return Ok(Arc::clone(&found.layer));
         }
         let layer = Arc::new(scanned::scan(scene, &scene.members[member], request, job)?);
-        let (hash, ordered) = &mut *shelf();
-        if *hash != scene.hash {
-            (*hash, *ordered) = (scene.hash.clone(), Vec::new());
-        }
-        ordered.push(Ordered { member, request: request.clone(), layer: Arc::clone(&layer) });
+        let ordered = Ordered { member, request: request.clone(), layer: Arc::clone(&layer) };
+        self.of(scene).scanned.push(ordered);
         Ok(layer)
+    }
+
+    /// From the shelf, or cut and put there in place of what was cut before.
+    fn sections(
+        &self,
+        scene: &Scene,
+        images: &Arc<[PathBuf]>,
+        voxel_mm: Option<[f32; 3]>,
+        job: &Job,
+    ) -> Result<Sections, VolumeError> {
+        if let Some((of, sections)) = &self.of(scene).cut
+            && of == images
+        {
+            return Ok(Arc::clone(sections));
+        }
+        let sections = Arc::new(stack::sections(images, voxel_mm, &Plane::all(), job)?);
+        self.of(scene).cut = Some((Arc::clone(images), Arc::clone(&sections)));
+        Ok(sections)
+    }
+
+    /// What there is of a scene; of another one all is thrown away.
+    fn of(&self, scene: &Scene) -> MutexGuard<'_, Shelf> {
+        let mut shelf = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if shelf.scene != scene.hash {
+            *shelf = Shelf { scene: scene.hash.clone(), ..Shelf::default() };
+        }
+        shelf
     }
 }
 
@@ -160,6 +196,20 @@ impl SliceSource {
                         )
                     }))
                 }
+                Slices::Stack { name, images, voxel_mm, drilled } => {
+                    let images: Arc<[PathBuf]> = images.as_slice().into();
+                    all.extend(Plane::all().into_iter().map(|plane| {
+                        source(
+                            name,
+                            What::Stack {
+                                images: Arc::clone(&images),
+                                voxel_mm: *voxel_mm,
+                                plane,
+                                drilled: *drilled,
+                            },
+                        )
+                    }));
+                }
                 &Slices::Drawn { ref name, count, size, pixel_mm, seed } => {
                     let request = |index| drawn::Request { index, count, size, pixel_mm, seed };
                     all.extend(
@@ -190,6 +240,15 @@ impl SliceSource {
         let core = &self.core;
         match &self.what {
             What::File { image, .. } => format!("{core}, {}", image.display()),
+            What::Stack { images, plane, .. } => {
+                let file = images.first().map_or(Path::new(""), PathBuf::as_path).display();
+                let way = match plane.normal {
+                    Normal::X => "across x",
+                    Normal::Y => "across y",
+                    Normal::Z => "slice",
+                };
+                format!("{core}, {file}, {way} at {:.0} %", 100.0 * plane.share)
+            }
             What::Drawn(request) => {
                 format!("{core}, section {} of {}", request.index + 1, request.count)
             }
@@ -201,7 +260,7 @@ impl SliceSource {
     #[must_use]
     pub fn origin(&self) -> Origin {
         match self.what {
-            What::File { .. } => Origin::File,
+            What::File { .. } | What::Stack { .. } => Origin::File,
             What::Drawn(_) => Origin::Drawn,
             What::Scanned(_) => Origin::Scanned,
         }
@@ -211,7 +270,9 @@ impl SliceSource {
     #[must_use]
     pub fn along(&self) -> Option<f64> {
         match &self.what {
-            What::File { drilled, .. } => drilled.along.map(f64::from),
+            What::File { drilled, .. } | What::Stack { drilled, .. } => {
+                drilled.along.map(f64::from)
+            }
             What::Drawn(request) => Some(request.along()),
             What::Scanned(request) => Some(f64::from(request.along)),
         }
@@ -220,19 +281,46 @@ impl SliceSource {
     /// Where it was drilled, as far as the scene says; none of slices that were made.
     #[must_use]
     pub fn drilled(&self) -> Option<Drilled> {
-        if let What::File { drilled, .. } = &self.what { Some(*drilled) } else { None }
+        match &self.what {
+            What::File { drilled, .. } | What::Stack { drilled, .. } => Some(*drilled),
+            What::Drawn(_) | What::Scanned(_) => None,
+        }
+    }
+
+    /// Which way the member's axis runs in its picture; none: nobody knows.
+    #[must_use]
+    pub fn axis(&self) -> Option<AxisRuns> {
+        match &self.what {
+            What::File { drilled, .. } => drilled.axis,
+            What::Stack { drilled, plane, .. } => drilled.axis.map(|axis| plane.axis(axis)),
+            What::Drawn(_) | What::Scanned(_) => Some(AxisRuns::Through),
+        }
+    }
+
+    /// Whether it lies across its member, as far as anybody knows.
+    fn is_across(&self) -> bool {
+        match &self.what {
+            What::Stack { plane, drilled, .. } if drilled.axis.is_none() => {
+                plane.normal == Normal::Z
+            }
+            _ => !matches!(self.axis(), Some(AxisRuns::Right | AxisRuns::Down)),
+        }
     }
 
     /// Why it will not be used, as far as can be told without looking for damage in it; none where
     /// nothing is known against it.
     #[must_use]
     pub fn refusal(&self, scene: &Scene) -> Option<String> {
-        let What::File { image, masks, pixel_mm, .. } = &self.what else { return None };
-        let opened = opened(scene, self.member, image, *pixel_mm);
-        opened
-            .and_then(|mut file| pixels(&mut file, masks).map_err(SliceError::from))
-            .err()
-            .map(|why| why.to_string())
+        let looked = match &self.what {
+            What::File { image, masks, pixel_mm, .. } => {
+                opened(scene, self.member, image, *pixel_mm, self.longest_mm(scene))
+                    .and_then(|mut file| pixels(&mut file, masks).map_err(SliceError::from))
+                    .map(drop)
+            }
+            What::Stack { images, voxel_mm, .. } => self.piled(scene, images, *voxel_mm),
+            What::Drawn(_) | What::Scanned(_) => Ok(()),
+        };
+        looked.err().map(|why| why.to_string())
     }
 
     /// What the file's own tags say of its pixels against the scene.
@@ -246,7 +334,7 @@ impl SliceSource {
     #[must_use]
     pub fn design(&self, scene: &Scene, slice: &Slice) -> Option<drawn::Design> {
         // Of a core's outline nothing follows.
-        if self.drilled().is_some_and(|d| d.diameter_mm.is_some()) {
+        if !self.is_across() || self.drilled().is_some_and(|d| d.diameter_mm.is_some()) {
             return None;
         }
         let size = u32::try_from(slice.grey.width.max(slice.grey.height)).ok()?;
@@ -267,16 +355,36 @@ impl SliceSource {
         &self,
         scene: &Scene,
         how: &DetectSettings,
-        shelf: &ScanShelf,
+        shelf: &SliceShelf,
         job: &Job,
     ) -> Result<SliceRead, SliceError> {
-        let mut doubt = None;
+        let (mut doubt, mut offset_m) = (None, 0.0);
         let (slice, known) = match &self.what {
             What::File { image, masks, pixel_mm, .. } => {
-                let mut file = opened(scene, self.member, image, *pixel_mm)?;
+                let longest = self.longest_mm(scene);
+                let mut file = opened(scene, self.member, image, *pixel_mm, longest)?;
                 doubt = file.contradiction();
                 let (slice, labels) = pixels(&mut file, masks)?;
                 (slice, labels.map(Known::Labels))
+            }
+            What::Stack { images, voxel_mm, plane, drilled } => {
+                self.piled(scene, images, *voxel_mm)?;
+                let sections = shelf.sections(scene, images, *voxel_mm, job)?;
+                let planes = Plane::all();
+                let at = planes.iter().position(|p| p == plane).unwrap_or_default();
+                let Some(section) = sections.get(at).and_then(Option::as_ref) else {
+                    let why = "its slices lie too far apart for sections along them";
+                    return Err(SliceError::Unfit(format!("{}: {why}", self.label())));
+                };
+                let mm = section.from_middle_mm;
+                offset_m = drilled.axis.map_or(0.0, |axis| {
+                    1e-3 * match axis {
+                        AxisRuns::Right => mm[0],
+                        AxisRuns::Down => mm[1],
+                        AxisRuns::Through => mm[2],
+                    }
+                });
+                (section.slice.clone(), None)
             }
             What::Drawn(request) => {
                 let member = || scene.members[self.member].name.clone();
@@ -291,9 +399,48 @@ impl SliceSource {
         };
         let found = detect(&slice, how, job)?;
         if let Some(drilled) = &self.drilled() {
-            fits(scene, self.member, drilled, &slice, &found)?;
+            fits(scene, self.member, drilled, self.longest_mm(scene), &slice, &found)?;
         }
-        Ok(SliceRead { slice, found, known, doubt })
+        Ok(SliceRead { slice, found, known, doubt, offset_m })
+    }
+
+    /// The longest that its picture may show of its member, mm; none: its section is.
+    fn longest_mm(&self, scene: &Scene) -> Option<f64> {
+        let is_pile = matches!(self.what, What::Stack { .. });
+        let along = !self.is_across() || (is_pile && self.axis().is_none());
+        along.then(|| 1e3 * f64::from(scene.members[self.member].frame.axis.length()))
+    }
+
+    /// Refuses a volume whose headers do not fit, or of which nobody knows how large it is.
+    fn piled(
+        &self,
+        scene: &Scene,
+        images: &[PathBuf],
+        voxel_mm: Option<[f32; 3]>,
+    ) -> Result<(), SliceError> {
+        let voxel = voxel_mm.map(|edges| edges.map(|mm| 1e-3 * f64::from(mm)));
+        let reader = Reader::pile(images.to_vec(), voxel)?;
+        let grid = reader.grid();
+        let sides = [0, 1, 2].map(|k| 1e3 * grid.voxel[k] * grid.size[k] as f64);
+        let member = &scene.members[self.member];
+        let longest = widest_mm(scene, self.member)
+            .unwrap_or(f64::INFINITY)
+            .max(1e3 * f64::from(member.frame.axis.length()));
+        let (least, most) = (sides[0].min(sides[1]), sides.into_iter().fold(0.0, f64::max));
+        let path = reader.path().display();
+        let unfit = |why: String| Err(SliceError::Unfit(format!("{path}: {why}")));
+        match () {
+            () if most > WIDEST[0] * longest => unfit(format!(
+                "the volume is {} long and the member {}: voxel_mm in µm?",
+                length(most),
+                length(longest)
+            )),
+            () if least < NARROWEST_MM => unfit(format!(
+                "the volume is {} wide, hardly a grain: voxel_mm in m or cm?",
+                length(least)
+            )),
+            () => Ok(()),
+        }
     }
 }
 
@@ -342,11 +489,12 @@ fn opened(
     member: usize,
     image: &Path,
     pixel_mm: Option<f32>,
+    longest: Option<f64>,
 ) -> Result<slice::Slices, SliceError> {
     let slices = slice::Slices::open(image, pixel_mm)?;
     let unfit = |why: String| Err(SliceError::Unfit(format!("{}: {why}", image.display())));
     let picture = slices.sides_mm().into_iter().fold(0.0, f64::max);
-    let section = widest_mm(scene, member).unwrap_or(f64::INFINITY);
+    let section = widest_mm(scene, member).unwrap_or(f64::INFINITY).max(longest.unwrap_or(0.0));
     match () {
         () if slices.pixel_from() == PixelFrom::Nobody => unfit(
             "neither the scene nor the file says how large its pixels are: add pixel_mm".to_owned(),
@@ -370,6 +518,7 @@ fn fits(
     scene: &Scene,
     member: usize,
     drilled: &Drilled,
+    longest: Option<f64>,
     slice: &Slice,
     found: &Detection,
 ) -> Result<(), SliceError> {
@@ -384,7 +533,8 @@ fn fits(
     let sides = [side(&|i| i % found.seen.width), side(&|i| i / found.seen.width)];
     let (wide, thin) = (sides[0].max(sides[1]), sides[0].min(sides[1]));
     let diagonal = drawn::extent_mm(scene, member, f64::from(drilled.along.unwrap_or(0.5)))
-        .map_or(f64::INFINITY, |[a, b]| a.hypot(b));
+        .map_or(f64::INFINITY, |[a, b]| a.hypot(b))
+        .max(longest.unwrap_or(0.0));
     let unfit = |why: String| Err(SliceError::Unfit(format!("{}: {why}", slice.name)));
     match drilled.diameter_mm.map(f64::from) {
         _ if wide > WIDEST[1] * diagonal => unfit(format!(
@@ -437,7 +587,7 @@ mod tests {
     fn what_was_scanned_is_not_scanned_again() {
         let scene = Scene::load_bundled("column", &Job::default()).unwrap();
         let of = |seed| scanned::Request { scanner: "none".into(), along: 0.5, seed };
-        let (shelf, job) = (ScanShelf::default(), Job::default());
+        let (shelf, job) = (SliceShelf::default(), Job::default());
         let slice = Slice {
             name: "disc".into(),
             grey: Grid { width: 1, height: 1, data: vec![0.0] },
@@ -446,14 +596,14 @@ mod tests {
         let truth = Mask { width: 1, height: 1, data: vec![false] };
         let layer =
             Arc::new(Layer { slice, truth, porosity: 0.05, cracks: Vec::new(), body_area: 1 });
-        *shelf.0.lock().unwrap() =
-            (scene.hash.clone(), vec![Ordered { member: 0, request: of(1), layer }]);
+        let scanned = vec![Ordered { member: 0, request: of(1), layer }];
+        *shelf.0.lock().unwrap() = Shelf { scene: scene.hash.clone(), scanned, cut: None };
         assert_eq!(shelf.fetch(&scene, 0, &of(1), &job).unwrap().porosity, 0.05);
         assert!(
             shelf.fetch(&scene, 0, &of(2), &job).is_err()
                 && shelf.fetch(&scene, 1, &of(1), &job).is_err()
         );
-        *shelf.0.lock().unwrap() = ("another".into(), Vec::new());
+        shelf.0.lock().unwrap().scene = "another".into();
         assert!(shelf.fetch(&scene, 0, &of(1), &job).is_err());
     }
 }

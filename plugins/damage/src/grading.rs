@@ -336,7 +336,13 @@ mod tests {
         assert_eq!(rule.damage(p(0.01), &[], 100.0).value, 0.0);
         let half = rule.damage(p(0.02 + 2_f64.ln() / 7.0), &[], 100.0);
         assert!((half.value - 0.5).abs() < 1e-12);
-        let crack = Crack { length_px: 0.0, length_mm: 50.0, width_mm: 0.5, at_mm: [0.0; 2] };
+        let crack = Crack {
+            length_px: 0.0,
+            length_mm: 50.0,
+            width_mm: 0.5,
+            at_mm: [0.0; 2],
+            box_mm: [0.0; 2],
+        };
         let both = rule.damage(p(0.02 + 2_f64.ln() / 7.0), &[crack], 100.0);
         assert!((both.value - (1.0 - 0.5 * 0.75)).abs() < 1e-12);
         assert!((both.std_error - 0.25 * 0.25 * 0.5).abs() < 1e-12);

@@ -7,6 +7,7 @@ pub mod fusion;
 pub mod gauges;
 pub mod grading;
 pub mod ledger;
+pub mod monitoring;
 mod plugin;
 pub mod predict;
 mod reach;

@@ -2,7 +2,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use bevy_app::{App, Plugin, Update};
 use bevy_ecs::prelude::*;
-use intrados_ct::source::ScanShelf;
+use intrados_ct::source::SliceShelf;
 use intrados_scene::{
     Member, Scene,
     plugin::{CurrentScene, SceneIndex},
@@ -34,7 +34,7 @@ pub struct Predicting {
     /// A profile that holds whatever the scene names.
     pub profile: Option<Profile>,
     /// Scans that the scene orders, whoever orders them first.
-    pub shelf: ScanShelf,
+    pub shelf: SliceShelf,
     /// Where finished pieces of work are kept, and those of an earlier run are found; the set's key
     /// says all that they depend on but the scene.
     pub parts: Option<Arc<Mutex<Set>>>,

@@ -14,6 +14,8 @@ use serde::Serialize;
 pub struct Basis {
     /// Whose structure it is.
     pub project: Project,
+    /// Where on earth its model says that it stands, for people; empty where it does not.
+    pub on_earth: String,
     /// Its members, in the order of the scene.
     pub members: Vec<MemberBasis>,
 }
@@ -51,7 +53,8 @@ impl Basis {
         project.inspected = project
             .inspected
             .or_else(|| scene.structure.observations.iter().filter_map(|o| o.date).max());
-        Self { project, members: scene.members.iter().map(member).collect() }
+        let on_earth = on_earth(scene);
+        Self { project, on_earth, members: scene.members.iter().map(member).collect() }
     }
 
     /// The day so many months after the inspection; none where nobody said when that was.
@@ -68,6 +71,21 @@ impl Basis {
     }
 }
 
+/// The middle of the scene on the map of its model, or what the model says of its site.
+fn on_earth(scene: &Scene) -> String {
+    let place = &scene.structure.georeference;
+    let [low, high] = scene.bounds();
+    if let (Some([east, north, height]), Some(map)) = (place.on_map(0.5 * (low + high)), &place.map)
+    {
+        let crs = if map.crs.is_empty() { "unnamed reference system" } else { &map.crs };
+        return format!("middle at {east:.1} m E, {north:.1} m N, {height:.1} m ({crs})");
+    }
+    match (place.latitude_deg, place.longitude_deg) {
+        (Some(latitude), Some(longitude)) => format!("{latitude:.5}° N, {longitude:.5}° E"),
+        _ => String::new(),
+    }
+}
+
 fn member(structure: &Structure, m: &Member) -> MemberBasis {
     let assembly = structure.assembly_of(&m.id);
     let length_m = f64::from(m.frame.axis.length());
@@ -76,7 +94,7 @@ fn member(structure: &Structure, m: &Member) -> MemberBasis {
     sides.sort_by(f32::total_cmp);
     let volume = if m.volume > 0.0 { format!(", {:.2} m³", m.volume) } else { String::new() };
     let mut assumed = Vec::new();
-    if m.concrete_assumed {
+    if m.concrete_assumed && assembly.is_none_or(|a| a.matter.is_none()) {
         assumed.push("concrete");
     }
     if assembly.is_some_and(|a| a.steel_assumed) {
@@ -91,7 +109,9 @@ fn member(structure: &Structure, m: &Member) -> MemberBasis {
         id: m.id.clone(),
         length_m,
         size: format!("{length_m:.2} m long, box {:.2} × {:.2} m{volume}", sides[0], sides[1]),
-        concrete: m.concrete.clone(),
+        concrete: assembly
+            .and_then(|a| a.matter.as_ref())
+            .map_or_else(|| m.concrete.clone(), |matter| matter.name.clone()),
         steel: assembly.map_or_else(|| "none known".into(), steel),
         exposure: m
             .exposure

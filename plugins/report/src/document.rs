@@ -65,8 +65,9 @@ impl Document {
 }
 
 /// Writes, all at once ([`Set`]), `report.html`, `evidence.csv`, `members.csv`, `zones.csv`,
-/// `defects.csv`, `slices.csv`, `pores.csv`, `damage.bcf` and `predict.json` into a folder, which is
-/// made if it is not there; where members have surfaces, `damage.glb` and `damage.vtu` too. Names them in the document.
+/// `defects.csv`, `slices.csv`, `pores.csv`, `damage.bcf`, `damage-3.0.bcf` and `predict.json` into
+/// a folder, which is made if it is not there; where members have surfaces, `damage.glb` and
+/// `damage.vtu` too, and a `model` by its name where there is one. Names them in the document.
 ///
 /// # Errors
 /// A file cannot be written.
@@ -75,6 +76,7 @@ pub fn write(
     scene: &Scene,
     document: &mut Document,
     pictures: &[Picture],
+    model: Option<(&str, &[u8])>,
     provenance: &Provenance,
 ) -> Result<Vec<PathBuf>, WriteError> {
     let mut files = begin(folder)?;
@@ -86,8 +88,8 @@ pub fn write(
         ("slices.csv", slices_csv),
         ("pores.csv", pores),
     ];
-    let reserved =
-        ["report.html"].into_iter().chain(texts.iter().map(|t| t.0)).chain([TOPICS, PREDICTION]);
+    let reserved = ["report.html"].into_iter().chain(texts.iter().map(|t| t.0));
+    let reserved = reserved.chain([TOPICS, TOPICS_3, PREDICTION]).chain(model.map(|m| m.0));
     reserved.for_each(|name| _ = files.place(name));
     model::write(&mut files, scene, &document.prediction)?;
     document.files = files.files().iter().map(|p| p.display().to_string()).collect();
@@ -100,16 +102,22 @@ pub fn write(
         put_into(&mut files, name, text(&document.prediction).as_bytes())?;
     }
     let (prediction, basis) = (&document.prediction, &document.basis);
-    let topics = bcf(scene, prediction, basis, &provenance.date, Version::V2_1)
-        .map_err(|source| WriteError { path: folder.join(TOPICS), source })?;
-    put_into(&mut files, TOPICS, &topics)?;
+    for (name, version) in [(TOPICS, Version::V2_1), (TOPICS_3, Version::V3_0)] {
+        let topics = bcf(scene, prediction, basis, &provenance.date, version)
+            .map_err(|source| WriteError { path: folder.join(name), source })?;
+        put_into(&mut files, name, &topics)?;
+    }
+    if let Some((name, bytes)) = model {
+        put_into(&mut files, name, bytes)?;
+    }
     let list = json(&folder.join(PREDICTION), document)?;
     put_into(&mut files, PREDICTION, list.as_bytes())?;
     publish(files, PREDICTION)
 }
 
-/// Defects for programs that have the IFC model open.
+/// Defects for programs that have the IFC model open, and for those that read the newer form.
 const TOPICS: &str = "damage.bcf";
+const TOPICS_3: &str = "damage-3.0.bcf";
 /// The list of a prediction's files.
 const PREDICTION: &str = "predict.json";
 

@@ -11,7 +11,7 @@ use intrados_ct::{
 };
 use intrados_damage::{
     forecast::FORECAST,
-    gauges::GAUGES,
+    gauges::{GAUGES, GaugeReading},
     ledger::Group,
     predict::{Defect, MemberPrediction, Origin, Prediction, SliceReading},
     survey::SURVEY,
@@ -224,6 +224,15 @@ impl<'a> Page<'a> {
         svg::map(m, self.length(m))
     }
 
+    fn has_pictures(&self, m: &MemberPrediction) -> bool {
+        m.defects.iter().any(|d| d.picture.is_some())
+    }
+
+    /// The address of a defect's picture.
+    fn look(&self, defect: &Defect) -> Option<String> {
+        defect.picture.as_ref()?.data_url()
+    }
+
     fn length(&self, m: &MemberPrediction) -> f64 {
         self.document.basis.length_of(&m.id)
     }
@@ -389,43 +398,32 @@ impl<'a> Page<'a> {
 
     /// What gauges measured, beside what a sound member would show.
     fn readings(&self, m: &MemberPrediction) -> Vec<Reading> {
-        let all = m.evidence.get(GAUGES).and_then(|e| e.details.get("readings")?.as_array());
-        let one = |r: &serde_json::Value| {
-            let number = |name: &str| r[name].as_f64();
-            let (read, sound) = (number("read")?, number("sound")?);
-            let text = |name: &str| r[name].as_str().unwrap_or_default().to_owned();
-            let (scale, unit) = match r["unit"].as_str() {
-                Some("m") => (1e3, "mm"),
-                _ => (1e6, "µε"),
-            };
-            Some(Reading {
-                gauge: text("gauge"),
-                test: text("test"),
-                measured: format!(
-                    "{:.2} ± {:.2} {unit}",
-                    scale * read,
-                    scale * number("std_error")?
-                ),
-                expected: format!("{:.2} {unit}", scale * sound),
-                ratio: cell((sound != 0.0).then(|| read / sound), 2),
-                z: cell(number("z"), 1),
-            })
+        let one = |r: &GaugeReading| {
+            let (scale, unit) = if r.unit == "m" { (1e3, "mm") } else { (1e6, "µε") };
+            Reading {
+                gauge: r.gauge.clone(),
+                test: r.test.clone(),
+                measured: format!("{:.2} ± {:.2} {unit}", scale * r.read, scale * r.std_error),
+                expected: format!("{:.2} {unit}", scale * r.sound),
+                ratio: cell((r.sound != 0.0).then(|| r.read / r.sound), 2),
+                z: cell(Some(r.z), 1),
+            }
         };
-        all.into_iter().flatten().filter_map(one).collect()
+        m.gauges.iter().map(one).collect()
     }
 
     /// By date of inspection, and some years on: age, and the share of bars' section that is lost.
     fn course(&self, m: &MemberPrediction) -> Vec<(String, String, String)> {
-        let rust = m.evidence.get(SURVEY).and_then(|e| e.details.get("rust"));
-        let points = rust.and_then(|rust| rust["course"].as_array());
-        let one = |p: &serde_json::Value| {
-            let number = |name: &str| p[name].as_f64();
-            let when = p["date"].as_str().unwrap_or("foretold").to_owned();
-            let lost = [number("steel_lost")?, number("std_error")?].map(|x| 100.0 * x);
-            let lost = format!("{:.1} ± {:.1}", lost[0], lost[1]);
-            Some((when, format!("{:.0}", number("age_years")?), lost))
+        let one = |p: svg::Point| {
+            let [value, error] = [p.lost.value, p.lost.std_error].map(|x| 100.0 * x);
+            let when = p.date.unwrap_or_else(|| "foretold".into());
+            (when, format!("{:.0}", p.age_years), format!("{value:.1} ± {error:.1}"))
         };
-        points.into_iter().flatten().filter_map(one).collect()
+        course(m).into_iter().map(one).collect()
+    }
+
+    fn course_plot(&self, m: &MemberPrediction) -> String {
+        svg::course(&course(m))
     }
 
     /// The share of bars' section that was taken for lost before the last inspection, %.
@@ -597,6 +595,21 @@ fn section(s: &SliceReading, worst: f64) -> Section<'_> {
             cell(truth.and_then(|t| t.score.f1), 3),
         ],
     }
+}
+
+/// How much of the bars is lost at each date of inspection, and some years on.
+fn course(m: &MemberPrediction) -> Vec<svg::Point> {
+    let rust = m.evidence.get(SURVEY).and_then(|e| e.details.get("rust"));
+    let points = rust.and_then(|rust| rust["course"].as_array());
+    let one = |p: &serde_json::Value| {
+        let number = |name: &str| p[name].as_f64();
+        Some(svg::Point {
+            date: p["date"].as_str().map(str::to_owned),
+            age_years: number("age_years")?,
+            lost: Estimate { value: number("steel_lost")?, std_error: number("std_error")? },
+        })
+    };
+    points.into_iter().flatten().filter_map(one).collect()
 }
 
 /// A slice's name without the mark that is told beside it.

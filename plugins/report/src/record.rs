@@ -3,18 +3,18 @@
 //! make the same files, since both come here.
 
 use std::{
-    path::Path,
+    path::{Path, PathBuf},
     sync::Arc,
     time::{SystemTime, UNIX_EPOCH},
 };
 
 use intrados_light::{LitScene, Render, RenderSettings, Sides, View, scene_rule, tone::Tone};
-use intrados_scene::{Camera, Scene, gltf::Model};
+use intrados_scene::{Camera, Scene, gltf::Model, import::ImportError};
 use intrados_stage::{Cancelled, Job};
 
 use intrados_stage::file::WriteError;
 
-use super::{Document, Provenance, write};
+use super::{Document, Provenance, ifc, write};
 use crate::{
     surface::{coloured, facets},
     visibility::{
@@ -39,11 +39,13 @@ pub struct Record {
     pub samples: u64,
     /// Seed of pictures and projections.
     pub seed: u64,
+    /// The IFC model of which a copy gets the results; none: none does.
+    pub ifc: Option<PathBuf>,
 }
 
 impl Default for Record {
     fn default() -> Self {
-        Self { command: String::new(), samples: 16, seed: 1 }
+        Self { command: String::new(), samples: 16, seed: 1, ifc: None }
     }
 }
 
@@ -53,6 +55,9 @@ pub enum RecordError {
     /// A file could not be written.
     #[error(transparent)]
     Write(#[from] WriteError),
+    /// The IFC model cannot take the results.
+    #[error(transparent)]
+    Model(#[from] ImportError),
     /// Somebody asked to stop.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
@@ -101,7 +106,16 @@ impl Record {
             seed: (!pictures.is_empty()).then_some(self.seed),
             samples: (!pictures.is_empty()).then_some(self.samples),
         };
-        write(folder, scene, &mut document, &pictures, &provenance)?;
+        let model = match &self.ifc {
+            Some(path) => {
+                job.relabel("putting the results into the IFC model");
+                let aside = job.part(1.0, 1.0);
+                Some(ifc::with_results(path, &document.prediction, &provenance.date, &aside)?)
+            }
+            None => None,
+        };
+        let model = model.as_ref().map(|m| (m.name.as_str(), m.bytes.as_slice()));
+        write(folder, scene, &mut document, &pictures, model, &provenance)?;
         Ok(document)
     }
 

@@ -203,6 +203,72 @@ pub(super) fn profile(m: &MemberPrediction) -> String {
     svg
 }
 
+/// What is lost of the bars at an age.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Point {
+    /// Of an inspection; none: foretold.
+    pub(super) date: Option<String>,
+    pub(super) age_years: f64,
+    /// Share of the bars' section.
+    pub(super) lost: Estimate,
+}
+
+/// The course of rust over the years with its 95 % intervals; what is foretold is hollow.
+pub(super) fn course(points: &[Point]) -> String {
+    let (w, h, left, bottom) = (440.0, 150.0, 44.0, 34.0);
+    let ages = points.iter().map(|p| p.age_years);
+    let (first, last) =
+        ages.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), t| (a.min(t), b.max(t)));
+    let reach = |p: &Point| 100.0 * (p.lost.value + 1.96 * p.lost.std_error).min(1.0);
+    let most = points.iter().map(reach).fold(1.0, f64::max);
+    let ticks = ticks(most.ceil() as usize);
+    let top = most.max(ticks.last().map_or(1.0, |t| *t as f64));
+    let x = |age: f64| left + 16.0 + (w - left - 40.0) * (age - first) / (last - first).max(1e-9);
+    let y = |percent: f64| (h - bottom) - (h - bottom - 10.0) * percent.clamp(0.0, top) / top;
+    let mut svg = format!(
+        "<svg class=\"plot\" viewBox=\"0 0 {w} {h}\" role=\"img\" aria-label=\"Course of rust\">"
+    );
+    for tick in ticks {
+        let at = y(tick as f64);
+        let _ = write!(
+            svg,
+            "<line x1=\"{left}\" x2=\"{w}\" y1=\"{at:.1}\" y2=\"{at:.1}\" class=\"grid\"/><text x=\"{:.0}\" y=\"{:.1}\" text-anchor=\"end\">{tick}</text>",
+            left - 5.0,
+            at + 3.5
+        );
+    }
+    let line: Vec<String> = points
+        .iter()
+        .map(|p| format!("{:.1} {:.1}", x(p.age_years), y(100.0 * p.lost.value)))
+        .collect();
+    let _ = write!(svg, "<path d=\"M{}\" class=\"axis\" fill=\"none\"/>", line.join("L"));
+    for p in points {
+        let Estimate { value, std_error } = p.lost;
+        let (at, low, high) = (
+            x(p.age_years),
+            y(100.0 * (value - 1.96 * std_error)),
+            y(100.0 * (value + 1.96 * std_error)),
+        );
+        let look = if p.date.is_some() { "fill" } else { "hollow" };
+        let _ = write!(
+            svg,
+            "<path d=\"M{0:.1} {low:.1}h6m-3 0V{high:.1}m-3 0h6\" class=\"whisker\"/><circle cx=\"{at:.1}\" cy=\"{1:.1}\" r=\"4\" class=\"{look}\"/><text x=\"{at:.1}\" y=\"{2:.1}\" text-anchor=\"middle\">{3:.0}</text>",
+            at - 3.0,
+            y(100.0 * value),
+            h - bottom + 14.0,
+            p.age_years
+        );
+    }
+    let _ = write!(
+        svg,
+        "<text x=\"{:.0}\" y=\"{:.0}\" text-anchor=\"middle\">age [years]</text><text x=\"12\" y=\"{2:.0}\" text-anchor=\"middle\" transform=\"rotate(-90 12 {2:.0})\">lost [%]</text></svg>",
+        0.5 * (w + left),
+        h - 4.0,
+        y(0.5 * top)
+    );
+    svg
+}
+
 /// At most five round numbers from 0 up.
 fn ticks(most: usize) -> Vec<usize> {
     let raw = (most as f64 / 4.0).max(1.0);

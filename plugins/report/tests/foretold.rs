@@ -60,6 +60,7 @@ fn salt_without_numbers_is_assumed_with_its_spread() {
         &scene,
         &mut document,
         &[],
+        None,
         &intrados_report::Provenance::default(),
     )
     .unwrap();

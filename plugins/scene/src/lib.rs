@@ -24,7 +24,7 @@ pub use file::reference;
 pub use lamp::{Lamp, LampKind};
 pub use load::{Card, ErrorKind, LoadError, bundled, cards, validate};
 pub use material::{Material, Surface, Texture, TextureRef, Wrap};
-pub use member::{Damage, Drilled, Frame, Member, MemberKind, Slices};
+pub use member::{AxisRuns, Damage, Drilled, Frame, Member, MemberKind, Slices};
 pub use mesh::Mesh;
 pub use plugin::ScenePlugin;
 pub use problem::{Problem, Severity};

@@ -7,7 +7,7 @@ use glam::Vec3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::structure::Exposure;
+use crate::structure::{Date, Exposure};
 
 /// One structural member, the unit that damage is predicted for.
 #[derive(Component, Debug, Clone, PartialEq)]
@@ -118,8 +118,10 @@ pub enum MemberKind {
 }
 
 /// Where on a member a core was drilled or a section sawn, as far as it is known.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Drilled {
+    /// When.
+    pub date: Option<Date>,
     /// Place on the axis, 0 to 1.
     pub along: Option<f32>,
     /// Direction of the face from the axis, degrees.
@@ -128,6 +130,19 @@ pub struct Drilled {
     pub depth_m: Option<f32>,
     /// Diameter of the core, mm; none of a whole section.
     pub diameter_mm: Option<f32>,
+    /// Which way the member's axis runs in the pictures; none: nobody said.
+    pub axis: Option<AxisRuns>,
+}
+
+/// Which way a member's axis runs in a picture of its inside, or in a pile of them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub enum AxisRuns {
+    /// To the right: sections along the member.
+    Right,
+    /// Downwards: sections along the member.
+    Down,
+    /// Through the pictures: cross-sections.
+    Through,
 }
 
 /// CT slices of a member: image files, or made from the planted truth, by drawing or by a simulated
@@ -145,6 +160,19 @@ pub enum Slices {
         /// Edge of a pixel, mm; none: what the files tell.
         pixel_mm: Option<f32>,
         /// Where they come from.
+        drilled: Drilled,
+    },
+    /// A volume: slices that lie behind each other.
+    Stack {
+        /// Name of the core.
+        name: String,
+        /// One file of all slices, or one of each in the order of the numbers in their names
+        /// (of a DICOM series: of their places).
+        images: Vec<PathBuf>,
+        /// Edges of a voxel, mm: to the right, down, from slice to slice; none: what the files
+        /// tell.
+        voxel_mm: Option<[f32; 3]>,
+        /// Where it comes from; `along` is its middle.
         drilled: Drilled,
     },
     /// Cross-sections drawn in the image domain from the member's truth ("drawn, not scanned").
@@ -179,9 +207,10 @@ impl Slices {
     #[must_use]
     pub fn name(&self) -> &str {
         match self {
-            Self::Files { name, .. } | Self::Drawn { name, .. } | Self::Scanned { name, .. } => {
-                name
-            }
+            Self::Files { name, .. }
+            | Self::Stack { name, .. }
+            | Self::Drawn { name, .. }
+            | Self::Scanned { name, .. } => name,
         }
     }
 }

@@ -653,11 +653,20 @@ impl Line {
         let pieces = self.points.windows(2).filter(|w| inside(&w[1]));
         let length_px: f64 = pieces.map(|w| (w[1][0] - w[0][0]).hypot(w[1][1] - w[0][1])).sum();
         let middle = self.points.get(self.points.len() / 2).copied().unwrap_or_default();
+        let span = |k: usize| {
+            let [low, high] = self
+                .points
+                .iter()
+                .filter(|p| inside(p))
+                .fold([f64::INFINITY, 0.0], |[low, high], p| [low.min(p[k]), high.max(p[k])]);
+            (high - low).max(0.0) * pixel_mm
+        };
         Crack {
             length_px,
             length_mm: length_px * pixel_mm,
             width_mm: self.width * pixel_mm,
             at_mm: middle.map(|v| v * pixel_mm),
+            box_mm: [span(0), span(1)],
         }
     }
 }

@@ -9,6 +9,7 @@
 //! nothing is said of steel. What nobody has written into the scene (bad compaction, impact, a
 //! leaking joint) no forecast knows.
 
+mod course;
 mod width;
 
 use std::collections::BTreeMap;
@@ -22,7 +23,7 @@ use intrados_mechanics::{
         durability::{Bars, Corrosion, Lost},
     },
     member::{Handed, Meshing, Part, Prepared, largest_element, prepare_within},
-    model::{Failure, History, MarchSettings, Point, SteelKind, Step, System},
+    model::{Failure, Gauge, History, MarchSettings, Point, SteelKind, Step, System},
 };
 use intrados_scene::{Assembly, Frame, MemberKind, Scene, structure::Body};
 use intrados_stage::time::{DAY, YEAR};
@@ -30,6 +31,7 @@ use intrados_stage::{Estimate, Job};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
+pub use course::GaugeCourse;
 use width::E_STEEL;
 pub use width::{Tie, crack_width};
 
@@ -180,6 +182,9 @@ pub struct Forecast {
     /// What assumed concrete and reinforcement add to the relative error; 0 where they are stated.
     #[serde(default)]
     pub assumed_error: f64,
+    /// What its monitored gauges would show through its life.
+    #[serde(default)]
+    pub gauges: Vec<GaugeCourse>,
     /// Why its life ended early; empty if it did not.
     pub complaint: String,
     /// Assumptions.
@@ -224,6 +229,12 @@ pub fn forecast(
     settings: ForecastSettings,
     job: &Job,
 ) -> Result<Vec<Forecast>, ForecastError> {
+    if let Some(matter) = scene.structure.assembly(model).and_then(|a| a.matter.as_ref()) {
+        return Err(ForecastError::Because(format!(
+            "it is of {}, and of concrete alone anything is foretold",
+            matter.name
+        )));
+    }
     let mut prepared = prepared(scene, model, handed, settings, job)?;
     let now = prepared.times.last().copied().unwrap_or(0.0);
     prepared.times.push(now + settings.ahead_years * YEAR);
@@ -241,6 +252,7 @@ pub fn forecast(
             },
         )?;
     outcome.warnings.iter().for_each(|w| tracing::warn!("{model}: {w}"));
+    let gauges = std::mem::take(&mut watch.courses);
     let reached =
         outcome.steps.iter().rev().find(|s| s.residual.is_finite()).map_or(0.0, |s| s.time_s);
     if reached < now - 60.0 {
@@ -267,6 +279,7 @@ pub fn forecast(
             peak_tendon_pa: tendon(m),
             dof: outcome.dof,
             assumed_error: scene.structure.assembly(model).map_or(0.0, assumed_error),
+            gauges: gauges.clone(),
             complaint: outcome.complaint.clone(),
             notes: outcome.warnings.iter().chain(&outcome.notes).cloned().collect(),
         });
@@ -359,6 +372,9 @@ struct Watch<'a> {
     /// The part that a brick belongs to.
     part_of: Vec<Option<usize>>,
     cover: f64,
+    /// Monitored gauges of strain, each with one of stress at its place, and what they show.
+    monitored: Vec<[Gauge; 2]>,
+    courses: Vec<GaugeCourse>,
 }
 
 struct PartWatch {
@@ -418,6 +434,7 @@ impl<'a> Watch<'a> {
             .assembly(&prepared.id)
             .and_then(|a| cover(a.body.as_ref()?))
             .unwrap_or(0.05);
+        let monitored = monitored(scene, prepared);
         Self {
             prepared,
             rule,
@@ -426,7 +443,23 @@ impl<'a> Watch<'a> {
             parts: prepared.parts.iter().map(part).collect(),
             part_of,
             cover,
+            monitored: monitored.iter().map(|(_, pair)| *pair).collect(),
+            courses: monitored.into_iter().map(|(course, _)| course).collect(),
         }
+    }
+
+    /// Notes what monitored gauges would show.
+    fn listen(&mut self, structure: &System, history: &History, time: f64) -> Result<(), Failure> {
+        let modular = self.parts.first().map_or(1.0, |p| p.modular_ratio);
+        for (pair, course) in self.monitored.iter().zip(&mut self.courses) {
+            let read = structure.read(pair, history)?;
+            course.days.push(time / DAY);
+            course.strain.push(read[0]);
+            if time <= self.until + 60.0 {
+                course.elastic = read[1] * modular / E_STEEL;
+            }
+        }
+        Ok(())
     }
 
     fn zones(&self, part: usize, history: &History, points: &[[Point; 8]]) -> [Foretold; ZONES] {
@@ -600,11 +633,12 @@ impl PartWatch {
 impl Observer for Watch<'_> {
     fn see(
         &mut self,
-        _: &System,
+        structure: &System,
         history: &History,
         step: &Step,
         points: &[[Point; 8]],
     ) -> Result<(), Failure> {
+        self.listen(structure, history, step.time)?;
         for part in 0..self.parts.len() {
             let zones = self.zones(part, history, points);
             if step.time <= self.until + 60.0 {
@@ -615,6 +649,19 @@ impl Observer for Watch<'_> {
         let passed = self.prepared.times.iter().filter(|&&time| time <= step.time).count();
         Ok(self.job.step(passed, self.prepared.times.len())?)
     }
+}
+
+/// Gauges of strain that are read over the years, each with a gauge of stress at its place.
+fn monitored(scene: &Scene, prepared: &Prepared) -> Vec<(GaugeCourse, [Gauge; 2])> {
+    let is_read = |name: &str| scene.structure.series.iter().any(|s| s.gauge == name);
+    let of = |(name, gauge): &(String, Gauge)| match *gauge {
+        Gauge::Strain(host, along) if is_read(name) => {
+            let course = GaugeCourse { gauge: name.clone(), ..GaugeCourse::default() };
+            Some((course, [*gauge, Gauge::Stress(host, along)]))
+        }
+        _ => None,
+    };
+    prepared.gauges.iter().filter_map(of).collect()
 }
 
 /// Thickness of a tunnel's inner lining, m: one brick across it bends as two do, and takes a third

@@ -111,7 +111,7 @@ mod tests {
         GaugeReading {
             gauge: gauge.into(),
             test: test.into(),
-            unit,
+            unit: unit.into(),
             read,
             std_error: 1e-6,
             sound,

@@ -17,7 +17,7 @@ use intrados_mechanics::{
 use intrados_scene::{Scene, structure::Reading};
 use intrados_stage::{Cancelled, Estimate, Job};
 use intrados_transport::Perturbed;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::{
     evidence::{Cause, Evidence},
@@ -197,14 +197,14 @@ pub struct Explained {
 }
 
 /// One reading and what the model says of it.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct GaugeReading {
     /// Name of the gauge.
     pub gauge: String,
     /// Name of the load test.
     pub test: String,
     /// Of the numbers.
-    pub unit: &'static str,
+    pub unit: String,
     /// What was read.
     pub read: f64,
     /// Its standard error.
@@ -295,7 +295,7 @@ pub fn felt_from(
         GaugeReading {
             gauge: gauge.clone(),
             test: rig.tests[datum.reading / rig.gauges.len()].clone(),
-            unit: kind.unit(),
+            unit: kind.unit().into(),
             read: datum.value,
             std_error: datum.std_error,
             sound: expected[datum.reading],

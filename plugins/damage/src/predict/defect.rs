@@ -6,8 +6,13 @@ use intrados_scene::{
 };
 use serde::Serialize;
 
-use super::{CT, SliceReading};
+use intrados_ct::Picture;
+
+use super::{CT, SliceReading, section::widest};
 use crate::survey::{self, SURVEY};
+
+/// Longer side of a defect's picture, pixels.
+const LOOK: u32 = 240;
 
 /// One thing that is wrong with a member, as somebody found it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -32,6 +37,9 @@ pub struct Defect {
     pub item: String,
     /// The day on which it was found, where somebody said it.
     pub date: Option<String>,
+    /// What it looks like, small.
+    #[serde(skip)]
+    pub picture: Option<Picture>,
 }
 
 impl Defect {
@@ -63,6 +71,7 @@ fn seen(o: &Observation) -> Option<Defect> {
         source: SURVEY,
         item: o.name.clone(),
         date: o.date.map(|d| d.to_string()),
+        picture: o.picture.as_deref().and_then(|path| Picture::read(path, LOOK)),
     };
     match o.shows {
         Shows::Crack { width_mm, std_error_mm, course, length_m } => {
@@ -111,10 +120,11 @@ fn sectioned(slice: &SliceReading) -> Vec<Defect> {
         area_m2: None,
         source: CT,
         item: format!("{}, {}", slice.core, slice.name),
-        date: None,
+        date: slice.drilled.and_then(|d| d.date).map(|d| d.to_string()),
+        picture: None,
     };
-    let widest = slice.cracks.iter().max_by(|a, b| a.width_mm.total_cmp(&b.width_mm));
-    let crack = widest.map(|crack| Defect {
+    let crack = widest(&slice.cracks).map(|crack| Defect {
+        picture: slice.widest.clone(),
         width_mm: Some(crack.width_mm),
         length_m: Some(1e-3 * slice.cracks.iter().map(|c| c.length_mm).sum::<f64>()),
         ..defect("crack in the section", format!("{:.2} mm wide", crack.width_mm))

@@ -24,9 +24,10 @@ use crate::{
     evidence::{self, Cause, Evidence, EvidenceSource, Said, Sources},
     forecast::{self, FORECAST, Forecast, ForecastError, forecast},
     fusion::Whole,
-    gauges::{self, GAUGES, GaugeError},
+    gauges::{self, GAUGES, GaugeError, GaugeReading},
     grading::Profile,
     ledger,
+    monitoring::{self, MONITORING},
     score::{Cases, MemberScore, Outcome},
     survey::{self, SURVEY, Surveyed, surveyed},
     truth,
@@ -36,7 +37,7 @@ use crate::{
 use intrados_ct::{
     SliceError, detect,
     score::Tally,
-    source::{ScanShelf, SliceSource},
+    source::{SliceShelf, SliceSource},
     synthetic::{drawn::MARK, scanned},
 };
 
@@ -160,6 +161,9 @@ pub struct MemberPrediction {
     pub conflicts: Vec<String>,
     /// What was found to be wrong with it, one by one.
     pub defects: Vec<Defect>,
+    /// What its gauges read, beside what a sound member would show; also where no damage explains
+    /// them and they are no evidence.
+    pub gauges: Vec<GaugeReading>,
     /// Evidence by its source.
     pub evidence: BTreeMap<&'static str, Evidence>,
     /// Truth where it is known.
@@ -219,7 +223,7 @@ pub struct Truth {
 pub struct Predictor {
     settings: PredictSettings,
     /// Scans that somebody has ordered already.
-    shelf: ScanShelf,
+    shelf: SliceShelf,
     hash: String,
     queue: Vec<Item>,
     next: usize,
@@ -233,6 +237,10 @@ pub struct Predictor {
     fates: Vec<Option<String>>,
     /// Readings that could not be inverted, by their number, and why.
     unfelt: BTreeMap<usize, String>,
+    /// Gauges whose series say nothing, and why.
+    unmonitored: BTreeMap<String, String>,
+    /// What gauges read, by member.
+    measured: BTreeMap<usize, Vec<GaugeReading>>,
     /// Observations that count for nothing, by their number, and why.
     unheard: BTreeMap<usize, String>,
     /// Items of outside sources that count for nothing, by piece and number, and why.
@@ -254,12 +262,13 @@ struct Gathered {
 }
 
 /// What a piece of work came to, as it is kept between two runs.
-#[derive(Serialize, Deserialize)]
+#[derive(Default, Serialize, Deserialize)]
 struct Done {
     fate: Option<String>,
     slice: Option<section::Kept>,
     evidence: Option<evidence::Kept>,
     unused: BTreeMap<usize, String>,
+    gauges: Vec<GaugeReading>,
 }
 
 /// One piece of work.
@@ -317,7 +326,7 @@ impl Predictor {
         let names = scene.structure.assemblies.iter().map(name).collect();
         Self {
             settings,
-            shelf: ScanShelf::default(),
+            shelf: SliceShelf::default(),
             hash: scene.hash.clone(),
             queue,
             next: 0,
@@ -327,6 +336,8 @@ impl Predictor {
             told: Vec::new(),
             fates: Vec::new(),
             unfelt: BTreeMap::new(),
+            unmonitored: BTreeMap::new(),
+            measured: BTreeMap::new(),
             unheard: BTreeMap::new(),
             unused: BTreeMap::new(),
             lives: BTreeMap::new(),
@@ -336,7 +347,7 @@ impl Predictor {
 
     /// Takes ordered scans from a shelf that others use, too, and puts them there.
     #[must_use]
-    pub(crate) fn with_shelf(self, shelf: ScanShelf) -> Self {
+    pub(crate) fn with_shelf(self, shelf: SliceShelf) -> Self {
         Self { shelf, ..self }
     }
 
@@ -512,8 +523,10 @@ impl Predictor {
                 let Some(index) = scene.members.iter().position(|m| m.id == one.id) else {
                     continue;
                 };
-                self.told
-                    .extend(one.evidence(self.settings.profile.forecast_error).map(|e| (index, e)));
+                let (monitored, unused) = monitoring::heard(scene, index, &one);
+                self.unmonitored.extend(unused);
+                let foretold = one.evidence(self.settings.profile.forecast_error);
+                self.told.extend(foretold.into_iter().chain(monitored).map(|e| (index, e)));
             }
         }
         Ok(())
@@ -533,6 +546,7 @@ impl Predictor {
                 self.unfelt.extend(felt.unused.iter().cloned());
                 self.fates[self.next - 1] = felt.refused.clone();
                 self.told.extend(felt.evidence().map(|e| (member, e)));
+                self.measured.insert(member, felt.readings);
             }
             Ok(None) => {
                 self.fates[self.next - 1] = Some("none of its gauges lies on the member".into())
@@ -597,7 +611,7 @@ impl Predictor {
             Item::Slice(slice) => {
                 let slice =
                     if fine { Some(self.readings.get(slice.member)?.last()?.into()) } else { None };
-                Some(Done { fate, slice, evidence: None, unused: BTreeMap::new() })
+                Some(Done { fate, slice, ..Done::default() })
             }
             Item::Gauges(member) => {
                 let id = &scene.members.get(*member)?.id;
@@ -615,7 +629,8 @@ impl Predictor {
                     .map(|(number, why)| (*number, why.clone()))
                     .collect();
                 let evidence = self.kept(*member, GAUGES)?;
-                Some(Done { fate, slice: None, evidence, unused })
+                let gauges = self.measured.get(member).cloned().unwrap_or_default();
+                Some(Done { fate, evidence, unused, gauges, ..Done::default() })
             }
             Item::Survey(member) => {
                 let id = &scene.members.get(*member)?.id;
@@ -623,7 +638,7 @@ impl Predictor {
                     .filter_map(|(number, _)| Some((number, self.unheard.get(&number)?.clone())))
                     .collect();
                 let evidence = self.kept(*member, SURVEY)?;
-                Some(Done { fate, slice: None, evidence, unused })
+                Some(Done { fate, evidence, unused, ..Done::default() })
             }
             Item::Life(_) | Item::Outside(..) => None,
         }
@@ -637,7 +652,7 @@ impl Predictor {
 
     /// Takes the next piece from an earlier run: whether more are to come. None where it is no such
     /// piece.
-    fn take_up(&mut self, Done { fate, slice, evidence, unused }: Done) -> Option<bool> {
+    fn take_up(&mut self, Done { fate, slice, evidence, unused, gauges }: Done) -> Option<bool> {
         match self.queue.get(self.next)? {
             Item::Slice(item) => {
                 let readings = self.readings.get_mut(item.member)?;
@@ -648,6 +663,7 @@ impl Predictor {
                 let said = if let Some(kept) = evidence { Some(kept.again(GAUGES)?) } else { None };
                 self.told.extend(said.map(|e| (*member, e)));
                 self.unfelt.extend(unused);
+                self.measured.insert(*member, gauges);
             }
             Item::Survey(member) => {
                 let said = if let Some(kept) = evidence { Some(kept.again(SURVEY)?) } else { None };
@@ -850,6 +866,16 @@ impl Predictor {
             };
             put(of(id), id, GAUGES, gauges::reading_name(number, reading), refused.or_else(piece));
         }
+        for series in &scene.structure.series {
+            let gauge = scene.structure.gauges.iter().find(|g| g.name == series.gauge);
+            let id = gauge.map_or("", |g| g.member.as_str());
+            let own = self.unmonitored.get(&series.gauge).cloned();
+            let said = || match fate(of(id), MONITORING) {
+                Some((_, why)) => why.clone(),
+                None => Some("its member's life is not computed, which tells creep".into()),
+            };
+            put(of(id), id, MONITORING, monitoring::name(series), own.or_else(said));
+        }
         items.sort_by_key(|i| i.0);
         items.into_iter().map(|i| i.1).collect()
     }
@@ -861,6 +887,8 @@ impl Predictor {
         Gathered { evidence, whole, .. }: Gathered,
     ) -> MemberPrediction {
         let member = &scene.members[index];
+        let assembly = scene.structure.assembly_of(&member.id);
+        let matter = assembly.and_then(|a| a.matter.as_ref());
         let profile = &self.settings.profile;
         let said: Vec<&Evidence> =
             evidence.values().filter(|e| whole.counted.contains(e.source)).collect();
@@ -875,8 +903,8 @@ impl Predictor {
             id: member.id.clone(),
             name: member.name.clone(),
             kind: member.kind,
-            concrete: member.concrete.clone(),
-            concrete_assumed: member.concrete_assumed,
+            concrete: matter.map_or(&member.concrete, |m| &m.name).clone(),
+            concrete_assumed: member.concrete_assumed && matter.is_none(),
             damage: damage.map(|d| d.value),
             damage_std_error: damage.map(|d| d.std_error),
             state: verdict.state,
@@ -895,6 +923,7 @@ impl Predictor {
             conflicts: whole.conflicts,
             truth: self.truth(member, &self.readings[index]),
             defects: defects(scene, &member.id, &self.readings[index]),
+            gauges: self.measured.get(&index).cloned().unwrap_or_default(),
             evidence,
             slices: self.readings[index].clone(),
         }

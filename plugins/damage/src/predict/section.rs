@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use intrados_scene::{Drilled, Scene};
+use intrados_scene::{AxisRuns, Drilled, Scene};
 use intrados_stage::{Estimate, Job};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -18,9 +18,9 @@ use intrados_ct::{
     crack::Crack,
     detect::{self, Detection, Pore},
     outline,
-    picture::{Picture, slice_pictures},
+    picture::{Picture, crack_picture, slice_pictures},
     score::{Score, Tally},
-    source::{Known, Origin, ScanShelf, SliceRead, SliceSource},
+    source::{Known, Origin, SliceRead, SliceShelf, SliceSource},
     steel::{Steel, steel},
     synthetic::{drawn, scanned},
 };
@@ -43,7 +43,6 @@ pub struct SliceReading {
     /// Place on the member's axis, 0 to 1; none: unknown.
     pub along: Option<f64>,
     /// Where it was drilled, as far as the scene says; none of slices that were made.
-    #[serde(skip_deserializing)]
     pub drilled: Option<Drilled>,
     /// What the file's own tags say of its pixels, where that contradicts the scene.
     pub doubt: Option<String>,
@@ -63,8 +62,11 @@ pub struct SliceReading {
     pub sampling_error: f64,
     /// The cracks.
     pub cracks: Vec<Crack>,
-    /// Damage of this section by pores and cracks.
+    /// Damage of this section by pores and cracks; of one along the member its worst stretch.
     pub damage: Estimate,
+    /// Of a section along its member: what it says of each zone that it goes through.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub stretches: Vec<Stretch>,
     /// Share of the designed section that has fallen off; none where the slice does not show all of
     /// the section.
     pub lost: Option<Estimate>,
@@ -78,6 +80,18 @@ pub struct SliceReading {
     /// Slice and overlay, kept for the two worst slices of a member.
     #[serde(skip)]
     pub pictures: Option<[Picture; 2]>,
+    /// Its widest crack.
+    #[serde(skip)]
+    pub widest: Option<Picture>,
+}
+
+/// A part of a section along its member.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Stretch {
+    /// The middle of it on the member's axis, 0 to 1.
+    pub along: f64,
+    /// Damage by pores and by cracks across the member.
+    pub damage: Estimate,
 }
 
 /// What is truly in one slice.
@@ -101,9 +115,16 @@ impl SliceReading {
     /// Damage of this section's concrete: by pores, cracks and what has fallen off.
     #[must_use]
     pub fn concrete(&self) -> Estimate {
-        let pores_and_cracks =
-            Estimate { std_error: self.damage.std_error.max(FLOOR), ..self.damage };
+        let pores_and_cracks = floored(self.damage);
         all_causes(std::iter::once(pores_and_cracks).chain(self.lost)).unwrap_or(pores_and_cracks)
+    }
+
+    /// What it says of the concrete, place by place.
+    fn of_concrete(&self) -> Vec<(Option<f64>, Estimate)> {
+        match &self.stretches[..] {
+            [] => vec![(self.along, self.concrete())],
+            some => some.iter().map(|s| (Some(s.along), floored(s.damage))).collect(),
+        }
     }
 
     /// The same with its bars.
@@ -119,10 +140,9 @@ impl SliceReading {
 pub(super) struct Kept {
     reading: SliceReading,
     core_number: usize,
-    /// Place, direction, depth and diameter.
-    drilled: Option<[Option<f32>; 4]>,
     table: Vec<Pore>,
     pictures: Option<[Picture; 2]>,
+    widest: Option<Picture>,
     tally: Option<Tally>,
 }
 
@@ -131,25 +151,19 @@ impl From<&SliceReading> for Kept {
         Self {
             reading: reading.clone(),
             core_number: reading.core_number,
-            drilled: reading.drilled.map(|d| [d.along, d.angle_deg, d.depth_m, d.diameter_mm]),
             table: reading.table.clone(),
             pictures: reading.pictures.clone(),
+            widest: reading.widest.clone(),
             tally: reading.truth.as_ref().map(|t| t.tally),
         }
     }
 }
 
 impl From<Kept> for SliceReading {
-    fn from(Kept { reading, core_number, drilled, table, pictures, tally }: Kept) -> Self {
-        let drilled = drilled.map(|[along, angle_deg, depth_m, diameter_mm]| Drilled {
-            along,
-            angle_deg,
-            depth_m,
-            diameter_mm,
-        });
+    fn from(Kept { reading, core_number, table, pictures, widest, tally }: Kept) -> Self {
         let truth =
             reading.truth.map(|truth| SliceTruth { tally: tally.unwrap_or_default(), ..truth });
-        Self { core_number, drilled, table, pictures, truth, ..reading }
+        Self { core_number, table, pictures, widest, truth, ..reading }
     }
 }
 
@@ -161,7 +175,7 @@ pub(super) fn read(
     source: &SliceSource,
     scene: &Scene,
     settings: &PredictSettings,
-    shelf: &ScanShelf,
+    shelf: &SliceShelf,
     job: &Job,
 ) -> Result<SliceReading, PredictError> {
     let origin = source.origin();
@@ -170,7 +184,8 @@ pub(super) fn read(
     } else {
         settings.detect.in_members()
     };
-    let SliceRead { slice, found, known, doubt } = source.read(scene, &how, shelf, job)?;
+    let SliceRead { slice, found, known, doubt, offset_m } =
+        source.read(scene, &how, shelf, job)?;
     let rule = &settings.profile.rule;
     let section_mm = side_mm(found.body.count(), slice.pixel_mm);
     let truth = known.as_ref().and_then(|known| truth(known, &found, settings, &how));
@@ -180,10 +195,19 @@ pub(super) fn read(
     // steel.
     let laid = design.filter(|design| lost.is_some() && design.tendons == 0);
     let steel = laid.and_then(|design| steel(&slice, &found, &design.bars));
+    let length_m = f64::from(scene.members[source.member].frame.axis.length()).max(1e-6);
+    let along = source.along().map(|at| (at + offset_m / length_m).clamp(0.0, 1.0));
+    let stretches = match (source.axis(), along) {
+        (Some(runs @ (AxisRuns::Right | AxisRuns::Down)), Some(along)) => {
+            stretches(&found, runs, along, length_m, settings)
+        }
+        _ => Vec::new(),
+    };
+    let worst = stretches.iter().map(|s| s.damage).max_by(|a, b| a.value.total_cmp(&b.value));
     Ok(SliceReading {
         core: source.core.clone(),
         core_number: source.number,
-        along: source.along(),
+        along,
         drilled: source.drilled(),
         doubt,
         origin,
@@ -192,8 +216,10 @@ pub(super) fn read(
         pores: found.pores.len(),
         porosity: found.porosity,
         sampling_error: found.sampling_error,
-        damage: rule.damage(found.porosity, &found.cracks, section_mm),
+        damage: worst.unwrap_or_else(|| rule.damage(found.porosity, &found.cracks, section_mm)),
+        stretches,
         pictures: Some(slice_pictures(&found, known.as_ref().map(Known::mask))),
+        widest: widest(&found.cracks).map(|crack| crack_picture(&found, crack)),
         name: slice.name,
         lost,
         steel,
@@ -201,6 +227,61 @@ pub(super) fn read(
         cracks: found.cracks,
         table: found.pores,
     })
+}
+
+/// What a section along its member says, zone by zone: in each, how much of the width is cut by
+/// the cracks that lie there. What runs along the axis is not cut here: cross-sections show it.
+fn stretches(
+    found: &Detection,
+    runs: AxisRuns,
+    middle: f64,
+    length_m: f64,
+    settings: &PredictSettings,
+) -> Vec<Stretch> {
+    let (body, mm) = (&found.seen, f64::from(found.pixel_mm));
+    let axis = usize::from(runs == AxisRuns::Down);
+    let pixels = if axis == 0 { body.width } else { body.height };
+    let place = |at_mm: f64| middle + 1e-3 * (at_mm - 0.5 * pixels as f64 * mm) / length_m;
+    // Pixels of the body across the axis, step by step along it.
+    let mut across = vec![0_usize; pixels];
+    for i in body.pixels() {
+        across[if axis == 0 { i % body.width } else { i / body.width }] += 1;
+    }
+    let steps: Vec<(f64, usize)> = across
+        .iter()
+        .enumerate()
+        .filter(|(_, n)| **n > 0)
+        .map(|(i, n)| (place((i as f64 + 0.5) * mm), *n))
+        .filter(|(at, _)| (0.0..=1.0).contains(at))
+        .collect();
+    let in_zone = |zone: usize| {
+        let own: Vec<_> = steps.iter().filter(|(at, _)| zone_at(*at) == zone).collect();
+        // A sliver of a zone says nothing of it that its neighbour does not.
+        if own.is_empty() || 5 * own.len() < steps.len().min((1e2 * length_m / mm) as usize) {
+            return None;
+        }
+        let n = own.len() as f64;
+        let width_mm = mm * own.iter().map(|(_, n)| *n as f64).sum::<f64>() / n;
+        let cracks = found.cracks.iter().filter(|c| zone_at(place(c.at_mm[axis])) == zone);
+        let cut: Vec<Crack> = cracks
+            .map(|c| Crack { length_mm: c.length_mm.min(c.box_mm[1 - axis]), ..c.clone() })
+            .collect();
+        Some(Stretch {
+            along: own.iter().map(|(at, _)| at).sum::<f64>() / n,
+            damage: settings.profile.rule.damage(found.porosity, &cut, width_mm),
+        })
+    };
+    (0..ZONES).filter_map(in_zone).collect()
+}
+
+/// A damage with the error that noise alone gives.
+fn floored(damage: Estimate) -> Estimate {
+    Estimate { std_error: damage.std_error.max(FLOOR), ..damage }
+}
+
+/// The widest of some cracks.
+pub(super) fn widest(cracks: &[Crack]) -> Option<&Crack> {
+    cracks.iter().max_by(|a, b| a.width_mm.total_cmp(&b.width_mm))
 }
 
 /// What is truly in a slice, beside what was found in it.
@@ -278,12 +359,14 @@ fn mean_porosity(readings: &[SliceReading]) -> Estimate {
     Estimate { value, std_error: scatter.hypot(mean(&|r| r.porosity.std_error)) }
 }
 
-/// What a slice says of a cause, where it shows it.
-type Says = fn(&SliceReading) -> Option<Estimate>;
+/// What a slice says of a cause, place by place, where it shows it.
+type Says = fn(&SliceReading) -> Vec<(Option<f64>, Estimate)>;
 
 /// The causes that slices speak of.
-const CAUSES: [(Cause, Says); 2] =
-    [(Cause::Concrete, |r| Some(r.concrete())), (Cause::Steel, |r| Some(r.steel?.loss))];
+const CAUSES: [(Cause, Says); 2] = [
+    (Cause::Concrete, SliceReading::of_concrete),
+    (Cause::Steel, |r| r.steel.map(|steel| (r.along, steel.loss)).into_iter().collect()),
+];
 
 /// What the slices of a member `length` m long say; `None` if it has none.
 pub(super) fn seen(readings: &[SliceReading], length: f64, profile: &Profile) -> Option<Evidence> {
@@ -325,10 +408,13 @@ pub(super) fn seen(readings: &[SliceReading], length: f64, profile: &Profile) ->
     );
     let (mut zones, mut stands) = (BTreeMap::new(), BTreeMap::new());
     for (cause, value) in CAUSES {
-        let word = |r: &SliceReading| {
-            Some(Word { along: r.along, reading: value(r)?, core: r.core_number })
-        };
-        let words: Vec<Word> = readings.iter().filter_map(word).collect();
+        let words: Vec<Word> = readings
+            .iter()
+            .flat_map(|r| {
+                let word = |(along, reading)| Word { along, reading, core: r.core_number };
+                value(r).into_iter().map(word)
+            })
+            .collect();
         let field = Field::of(profile, cause, length);
         zones.insert(cause, field.zones(&words));
         stands.insert(cause, field.stands(&words));
@@ -469,6 +555,57 @@ mod tests {
                 .iter()
                 .any(|limit| limit.contains(&doubts[0].1))
         );
+    }
+
+    /// A core of 40 mm and 80 mm long, cracked right through, half a millimetre a voxel, as one
+    /// MetaImage `core.mha`; the crack lies in a cross-section that is not read.
+    fn cracked_volume(folder: &Path) {
+        let (n, depth) = (96_usize, 160_usize);
+        let header = format!(
+            "ObjectType = Image\nNDims = 3\nElementSpacing = 0.5 0.5 0.5\nDimSize = {n} {n} {depth}\nElementType = MET_UCHAR\nElementDataFile = LOCAL\n"
+        );
+        let voxel = |i: usize| {
+            let (x, y, z) = ((i % n) as f32, (i / n % n) as f32, (i / n / n) as f32);
+            let mouth = 70.0 + (0.3 * x).sin() + (0.2 * y).cos();
+            match () {
+                () if (x - 47.5).hypot(y - 47.5) > 40.0 => 0,
+                () if (z - mouth).abs() < 1.1 => {
+                    180 - (160.0 * (1.1 - (z - mouth).abs()).min(1.0)) as u8
+                }
+                () if (x - 60.0).hypot(y - 40.0).hypot(z % 40.0 - 20.0) < 5.0 => 20,
+                () => 176 + (i.wrapping_mul(2_654_435_761) >> 16) as u8 % 9,
+            }
+        };
+        let bytes = [header.into_bytes(), (0..n * n * depth).map(voxel).collect()].concat();
+        fs::write(folder.join("core.mha"), bytes).unwrap();
+    }
+
+    /// A crack across the member lies between cross-sections: sections along the core show it.
+    #[test]
+    fn a_crack_across_the_member_is_found_in_sections_along_a_volume() {
+        let volume = "Stack(name: \"core\", images: [\"core.mha\"], along: 0.25, diameter_mm: 40, axis: Through)";
+        let (folder, _) = column("");
+        cracked_volume(folder.path());
+        let path = folder.path().join("column.ron");
+        let text = fs::read_to_string(&path).unwrap();
+        fs::write(&path, text.replace("slices: []", &format!("slices: [{volume}]"))).unwrap();
+        let scene = Scene::load(&path, &Job::default()).unwrap();
+        let member = predicted(&scene, true).unwrap().members.remove(0);
+        let (along, across): (Vec<_>, Vec<_>) =
+            member.slices.iter().partition(|s| !s.stretches.is_empty());
+        assert_eq!((along.len(), across.len()), (10, 9));
+        assert!(across.iter().all(|s| s.cracks.is_empty() && s.damage.value < 0.1));
+        let through = |s: &&&SliceReading| {
+            s.cracks.iter().any(|c| c.length_mm > 0.8 * c.box_mm[0] && c.box_mm[0] > 20.0)
+        };
+        let found = along.iter().filter(through).count();
+        assert!(found >= 9, "{found}: {:?}", along.iter().map(|s| &s.cracks).collect::<Vec<_>>());
+        // Half a millimetre is half of what counts as open, over the whole width.
+        let own = member.evidence[CT].zones[&Cause::Concrete].0[2].unwrap();
+        assert!((0.3..0.8).contains(&own.value), "{own:?}");
+        // Slices of the core lie where they lie, to the millimetre.
+        let places: Vec<f64> = across.iter().filter_map(|s| s.along).collect();
+        assert!((places[8] - places[0] - 8.0 / 9.0 * 0.08 / 5.0).abs() < 2e-4, "{places:?}");
     }
 
     /// A core of 60 mm says what its zone is, and little of the rest of five metres; without a

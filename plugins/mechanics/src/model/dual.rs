@@ -87,7 +87,7 @@ impl System<'_> {
     ///
     /// # Errors
     /// [`Failure`].
-    pub(crate) fn read(&self, gauges: &[Gauge], history: &History) -> Result<Vec<f64>, Failure> {
+    pub fn read(&self, gauges: &[Gauge], history: &History) -> Result<Vec<f64>, Failure> {
         gauges.iter().map(|gauge| Ok(self.look(gauge, history)?.reading)).collect()
     }
 

@@ -11,7 +11,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use bevy_ecs::prelude::*;
 use egui::{ComboBox, Rect, Slider, TextureHandle, TextureOptions, Ui, pos2};
-use intrados_ct::{detect::Method, source::ScanShelf};
+use intrados_ct::{detect::Method, source::SliceShelf};
 use intrados_damage::Predicting;
 use intrados_scene::{Member, Scene, plugin::CurrentScene};
 use intrados_stage::{Estimate, Jobs, Task};
@@ -52,7 +52,7 @@ pub(crate) struct Ct {
     window: Option<[f32; 2]>,
     view: View,
     sinogram: bool,
-    shelf: ScanShelf,
+    shelf: SliceShelf,
     wish: scan::Wish,
     of: Option<(Stack, usize)>,
     task: Option<Task<Result<Read, String>>>,

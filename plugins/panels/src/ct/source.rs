@@ -3,7 +3,7 @@
 use intrados_ct::{
     detect::{DetectSettings, Detection, Method, detect},
     slice::Slice,
-    source::{Known, Origin, ScanShelf, SliceRead, SliceSource},
+    source::{Known, Origin, SliceRead, SliceShelf, SliceSource},
     synthetic::scanned::layer,
 };
 use intrados_scene::Scene;
@@ -58,7 +58,7 @@ pub(super) fn read(
     scene: &Scene,
     source: &Source,
     method: Method,
-    shelf: &ScanShelf,
+    shelf: &SliceShelf,
     job: &Job,
 ) -> Result<Read, String> {
     alone(|| {
@@ -72,7 +72,7 @@ pub(super) fn profile(
     scene: &Scene,
     sources: &[Source],
     method: Method,
-    shelf: &ScanShelf,
+    shelf: &SliceShelf,
     tell: impl Fn(usize, Result<Estimate, String>) + Send + Sync,
     job: &Job,
 ) -> Result<(), String> {
@@ -107,7 +107,7 @@ fn load(
     scene: &Scene,
     source: &Source,
     method: Method,
-    shelf: &ScanShelf,
+    shelf: &SliceShelf,
     job: &Job,
 ) -> Result<(Slice, Detection, Option<f64>), String> {
     let how = source.settings(method);

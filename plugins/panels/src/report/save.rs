@@ -93,7 +93,7 @@ pub(crate) fn take(mut report: ResMut<Report>, mut banners: ResMut<Banners>, mut
         Err(RecordError::Cancelled(Cancelled)) => {
             log.say(format!("writing {folder} was cancelled"))
         }
-        Err(RecordError::Write(error)) => {
+        Err(error @ (RecordError::Write(_) | RecordError::Model(_))) => {
             log.say(format!("⚠ not saved: {error}"));
             banners.cannot("Not saved", &error.to_string());
         }

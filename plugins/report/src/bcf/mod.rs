@@ -1,20 +1,22 @@
 //! Defects as topics of the BIM Collaboration Format, for programs that have the IFC model open:
 //! what it is, how urgent, which member, and a camera that looks at it.
 //!
-//! The camera stands in IFC's axes, z up. What an import took off coordinates far from the origin
-//! is known to the scene's comments alone, and is not added again.
+//! The camera stands in IFC's axes, z up, and in the coordinates of the model that was imported.
 
 mod view;
 mod xml;
 
 use std::io::{self, Cursor, Write};
 
-use glam::Vec3;
+use glam::DVec3;
 use intrados_damage::{
     predict::{Defect, MemberPrediction, Prediction},
     zone::ZONES,
 };
-use intrados_scene::{Scene, structure::Date};
+use intrados_scene::{
+    Scene,
+    structure::{Date, Georeference},
+};
 use serde_json::json;
 use zip::{CompressionMethod, DateTime, ZipWriter, write::SimpleFileOptions};
 
@@ -62,7 +64,8 @@ pub fn bcf(
     created: &str,
     version: Version,
 ) -> io::Result<Vec<u8>> {
-    let teller = Teller { prediction, basis, created: stamp(created), version };
+    let place = &scene.structure.georeference;
+    let teller = Teller { prediction, basis, place, created: stamp(created), version };
     let mut file = Archive::new();
     file.add("bcf.version", &version.edition())?;
     if version == Version::V3_0 {
@@ -124,6 +127,7 @@ impl Told<'_> {
 struct Teller<'a> {
     prediction: &'a Prediction,
     basis: &'a Basis,
+    place: &'a Georeference,
     created: String,
     version: Version,
 }
@@ -222,9 +226,9 @@ impl Teller<'_> {
                 visibility: xml::Visibility { default: true },
             },
             perspective_camera: view.map(|view| xml::PerspectiveCamera {
-                camera_view_point: ifc(view.eye),
-                camera_direction: ifc(view.direction),
-                camera_up_vector: ifc(view.up),
+                camera_view_point: ifc(self.place.in_model(view.eye)),
+                camera_direction: ifc(view.direction.as_dvec3()),
+                camera_up_vector: ifc(view.up.as_dvec3()),
                 field_of_view: FIELD_OF_VIEW,
                 aspect_ratio: (self.version == Version::V3_0).then_some(ASPECT),
             }),
@@ -233,9 +237,9 @@ impl Teller<'_> {
 }
 
 /// We have y up, IFC has z.
-fn ifc(v: Vec3) -> xml::Vector {
+fn ifc(v: DVec3) -> xml::Vector {
     // Six digits, and no −0.
-    let [x, y, z] = [v.x, -v.z, v.y].map(|c| (1e6 * f64::from(c)).round() / 1e6 + 0.0);
+    let [x, y, z] = [v.x, -v.z, v.y].map(|c| (1e6 * c).round() / 1e6 + 0.0);
     xml::Vector { x, y, z }
 }
 

@@ -56,18 +56,31 @@ pub fn listed(scene: &Scene) -> Vec<Listed> {
 }
 
 fn of_slices(member: &str, slices: &Slices) -> Option<Listed> {
-    let Slices::Files { name, images, pixel_mm, drilled, .. } = slices else { return None };
-    let Drilled { along, angle_deg, .. } = *drilled;
-    let pixel = pixel_mm.map_or(String::new(), |mm| format!(", {mm} mm a pixel"));
+    let (name, drilled, value) = match slices {
+        Slices::Files { name, images, pixel_mm, drilled, .. } => {
+            let pixel = pixel_mm.map_or(String::new(), |mm| format!(", {mm} mm a pixel"));
+            (name, drilled, format!("{} slices{pixel}", images.len()))
+        }
+        Slices::Stack { name, images, voxel_mm, drilled } => {
+            let edges = voxel_mm.map_or(String::new(), |[x, y, z]| format!(", {x} × {y} × {z} mm"));
+            let files = match images.len() {
+                1 => "volume".to_owned(),
+                n => format!("volume of {n} files"),
+            };
+            (name, drilled, files + &edges)
+        }
+        Slices::Drawn { .. } | Slices::Scanned { .. } => return None,
+    };
+    let Drilled { along, angle_deg, date, .. } = *drilled;
     Some(Listed {
         member: member.to_owned(),
         name: name.clone(),
         kind: "ct",
-        date: None,
+        date,
         along: along.map(|at| [at; 2]),
         angle_deg,
         height_m: None,
-        value: format!("{} slices{pixel}", images.len()),
+        value,
         instrument: None,
     })
 }

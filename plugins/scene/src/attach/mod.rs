@@ -8,6 +8,7 @@
 mod edit;
 mod listed;
 mod load_test;
+mod raw;
 
 use std::{
     collections::HashSet,
@@ -26,9 +27,10 @@ use tempfile::TempDir;
 
 pub use crate::file::evidence::{Along, Face, Finding, Kind};
 pub use listed::{Listed, listed};
+pub use raw::{Raw, VoxelType};
 
 use crate::{
-    LoadError, Scene,
+    AxisRuns, LoadError, Member, Scene,
     file::{
         Slices,
         evidence::{self, EvidenceFile, MemberSlices, Record, Survey, no_member},
@@ -90,8 +92,34 @@ pub struct Attachment {
     pub height_m: Option<f32>,
     /// What it was measured with.
     pub instrument: Option<String>,
+    /// A photograph of a finding, JPEG or PNG.
+    pub picture: Option<PathBuf>,
     /// What it is.
     pub what: What,
+}
+
+impl Attachment {
+    /// Its files, which are copied.
+    fn files(&self) -> &[PathBuf] {
+        match &self.what {
+            What::Finding(_) => self.picture.as_slice(),
+            What::LoadTest { .. } => &[],
+            What::Table { file, .. } => std::slice::from_ref(file),
+            What::Slices { files, .. } | What::Stack { files, .. } => files,
+        }
+    }
+
+    /// The middle of where it was on the axis.
+    fn middle(&self) -> Option<f32> {
+        self.along.map(|[from, to]| 0.5 * (from + to))
+    }
+
+    /// The side of its member that it was on, degrees.
+    fn angle(&self, member: &Member) -> Result<Option<f32>, AttachError> {
+        let Some(face) = self.face else { return Ok(self.angle_deg) };
+        let angle = face.angle_deg(member.kind, member.frame);
+        angle.map(Some).map_err(|why| AttachError::BadInput(format!("face: {why}")))
+    }
 }
 
 /// What can be attached.
@@ -118,16 +146,36 @@ pub enum What {
         files: Vec<PathBuf>,
         /// Edge of a pixel, mm.
         pixel_mm: Option<f32>,
-        /// Depth below the face, m.
-        depth_m: Option<f32>,
-        /// Diameter of the core, mm.
-        diameter_mm: Option<f32>,
+        /// Where they were cut out.
+        cut: Cut,
+    },
+    /// A volume of one core: slices that lie behind each other.
+    Stack {
+        /// One file of all slices, or one of each.
+        files: Vec<PathBuf>,
+        /// Edges of a voxel, mm; what the files tell if absent.
+        voxel_mm: Option<[f32; 3]>,
+        /// How its voxels lie, where the file does not say it.
+        raw: Option<Raw>,
+        /// Where it was cut out.
+        cut: Cut,
     },
     /// A weight of a load test; the test has as many as were attached under its name.
     LoadTest {
         /// Downwards, kN.
         force_kn: f64,
     },
+}
+
+/// How a core was cut out of its member.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Cut {
+    /// Depth below the face, m.
+    pub depth_m: Option<f32>,
+    /// Diameter, mm; none: it was sawn.
+    pub diameter_mm: Option<f32>,
+    /// Which way the member's axis runs in the pictures.
+    pub axis: Option<AxisRuns>,
 }
 
 impl What {
@@ -301,11 +349,7 @@ impl Project {
         let own = format!("{}: ", self.evidence().display());
         let name = |dir: &TempDir| dir.path().file_name().unwrap_or_default().to_os_string();
         let copies = aside.map(|dir| format!("{}/", self.folder.join(name(dir)).display()));
-        let given = match &what.what {
-            What::Table { file, .. } => file.parent(),
-            What::Slices { files, .. } => files.first().and_then(|f| f.parent()),
-            What::Finding(_) | What::LoadTest { .. } => None,
-        };
+        let given = what.files().first().and_then(|f| f.parent());
         let given = given.map_or(String::new(), |folder| match folder.display().to_string() {
             folder if folder.is_empty() => folder,
             folder => format!("{folder}/"),
@@ -377,6 +421,10 @@ impl Project {
                 angle_deg: what.angle_deg,
                 height_m: what.height_m,
                 instrument: what.instrument.clone(),
+                picture: match &what.picture {
+                    Some(file) => Some(format!("{at}/{}", plain_name(file)?)),
+                    None => None,
+                },
                 shows: finding.clone(),
             }),
             What::Table { file, kind, unit, test, electrode } => Entry::Table(Survey {
@@ -394,23 +442,33 @@ impl Project {
                 unit: unit.clone(),
                 test: test.clone(),
             }),
-            What::Slices { files, pixel_mm, depth_m, diameter_mm } => {
-                let member = &scene.members[member];
-                let angle = match what.face {
-                    Some(face) => Some(
-                        face.angle_deg(member.kind, member.frame)
-                            .map_err(|why| AttachError::BadInput(format!("face: {why}")))?,
-                    ),
-                    None => what.angle_deg,
-                };
+            What::Slices { files, pixel_mm, cut } => {
                 let slices = Slices::Files {
                     name: name.to_owned(),
                     images: patterns(files, at)?,
                     pixel_mm: *pixel_mm,
-                    along: what.along.map(|[from, to]| 0.5 * (from + to)),
-                    angle_deg: angle,
-                    depth_m: *depth_m,
-                    diameter_mm: *diameter_mm,
+                    along: what.middle(),
+                    angle_deg: what.angle(&scene.members[member])?,
+                    depth_m: cut.depth_m,
+                    diameter_mm: cut.diameter_mm,
+                    axis: cut.axis,
+                    date: what.date,
+                };
+                Entry::Slices(MemberSlices { member: what.member.clone(), slices: vec![slices] })
+            }
+            What::Stack { files, voxel_mm, raw, cut } => {
+                let copies = files.iter().map(|f| copied_as(f, raw.as_ref()));
+                let slices = Slices::Stack {
+                    name: name.to_owned(),
+                    images: patterns(&copies.collect::<Vec<_>>(), at)?,
+                    // Of bare voxels the copy says it.
+                    voxel_mm: voxel_mm.filter(|_| raw.is_none()),
+                    along: what.middle(),
+                    angle_deg: what.angle(&scene.members[member])?,
+                    depth_m: cut.depth_m,
+                    diameter_mm: cut.diameter_mm,
+                    axis: cut.axis,
+                    date: what.date,
                 };
                 Entry::Slices(MemberSlices { member: what.member.clone(), slices: vec![slices] })
             }
@@ -436,10 +494,13 @@ impl Project {
         place: &str,
         job: &Job,
     ) -> Result<Option<TempDir>, AttachError> {
-        let files = match &what.what {
-            What::Finding(_) | What::LoadTest { .. } => return Ok(None),
-            What::Table { file, .. } => std::slice::from_ref(file),
-            What::Slices { files, .. } => files,
+        let files = what.files();
+        if files.is_empty() {
+            return Ok(None);
+        }
+        let bare = match &what.what {
+            What::Stack { raw: Some(raw), voxel_mm, .. } => Some((raw, edges(files, *voxel_mm)?)),
+            _ => None,
         };
         if files.len() > MAX_FILES {
             let line = format!("{} files are more than {MAX_FILES}: attach fewer", files.len());
@@ -449,6 +510,7 @@ impl Project {
         let mut names = HashSet::new();
         for file in files {
             access::open(file).map_err(|why| AttachError::denied(file, &why))?;
+            bare.iter().try_for_each(|(raw, _)| raw.check(file))?;
             if !names.insert(plain_name(file)?) {
                 let why = "another file of this name is attached with it: rename one of them";
                 return Err(AttachError::BadInput(format!("{}: {why}", file.display())));
@@ -465,8 +527,12 @@ impl Project {
         for (i, file) in files.iter().enumerate() {
             job.step(i, files.len()).map_err(LoadError::from)?;
             let (mut from, _) = access::open(file).map_err(|w| AttachError::denied(file, &w))?;
-            let to = aside.path().join(plain_name(file)?);
-            file::put(&to, |out| io::copy(&mut from, out).map(drop)).map_err(failed)?;
+            let to = aside.path().join(plain_name(&copied_as(file, bare.map(|b| b.0)))?);
+            file::put(&to, |out| match bare {
+                Some((raw, voxel_mm)) => raw.write(file, voxel_mm, out),
+                None => io::copy(&mut from, out).map(drop),
+            })
+            .map_err(failed)?;
         }
         Ok(Some(aside))
     }
@@ -490,7 +556,7 @@ impl Project {
     fn free_name(&self, scene: &Scene, what: &Attachment) -> String {
         let numbered: Box<dyn Fn(u32) -> String> = match &what.what {
             What::Finding(finding) => Box::new(|n| format!("{} {n}", finding.kind())),
-            What::Slices { .. } => Box::new(|n| format!("core {n}")),
+            What::Slices { .. } | What::Stack { .. } => Box::new(|n| format!("core {n}")),
             What::LoadTest { .. } => Box::new(|n| format!("load test {n}")),
             // Rows are called after their table, with a number behind it.
             What::Table { file, .. } => {
@@ -565,7 +631,7 @@ impl Project {
         let file = &self.file;
         let is = |m: &str, n: &str| m == member && n == name;
         if let Some(i) = file.items.iter().position(|r| is(&r.member, &r.name)) {
-            return Ok(("items", i, Vec::new()));
+            return Ok(("items", i, file.items[i].picture.iter().cloned().collect()));
         }
         if let Some(i) = file.tables.iter().position(|t| is(&t.member, &t.name)) {
             return Ok(("tables", i, vec![file.tables[i].file.clone()]));
@@ -622,7 +688,9 @@ impl Project {
     fn copies(&self, files: &[String], left: &EvidenceFile) -> Vec<PathBuf> {
         let named = |text: &str| {
             let tables = left.tables.iter().map(|t| &t.file);
-            tables.chain(left.slices.iter().flat_map(images)).any(|f| copy_of(f) == copy_of(text))
+            let pictures = left.items.iter().filter_map(|r| r.picture.as_ref());
+            let others = pictures.chain(left.slices.iter().flat_map(images));
+            tables.chain(others).any(|f| copy_of(f) == copy_of(text))
         };
         let mut copies = Vec::new();
         for text in files {
@@ -653,8 +721,26 @@ fn copy_of(text: &str) -> Option<(&str, &str)> {
 /// The images that slices name.
 fn images(slices: &MemberSlices) -> impl Iterator<Item = &String> {
     slices.slices.iter().flat_map(|one| match one {
-        Slices::Files { images, .. } => images.as_slice(),
+        Slices::Files { images, .. } | Slices::Stack { images, .. } => images.as_slice(),
         Slices::Drawn { .. } | Slices::Scanned { .. } => &[],
+    })
+}
+
+/// What a copy of a file is called: bare voxels get a header, and its ending.
+fn copied_as(file: &Path, raw: Option<&Raw>) -> PathBuf {
+    if raw.is_some() { file.with_extension("mha") } else { file.to_owned() }
+}
+
+/// Edges of bare voxels, mm, which somebody has to say.
+fn edges(files: &[PathBuf], voxel_mm: Option<[f32; 3]>) -> Result<[f32; 3], AttachError> {
+    let [file] = files else {
+        let why = "bare voxels are attached as one file of all slices".to_owned();
+        return Err(AttachError::BadInput(why));
+    };
+    let sound = |mm: &[f32; 3]| mm.iter().all(|mm| mm.is_finite() && *mm > 0.0);
+    voxel_mm.filter(sound).ok_or_else(|| {
+        let why = "does not say how large its voxels are: add --voxel-mm X,Y,Z";
+        AttachError::BadInput(format!("{}: {why}", file.display()))
     })
 }
 

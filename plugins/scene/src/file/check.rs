@@ -48,6 +48,9 @@ pub fn check(scene: &SceneFile) -> Vec<Problem> {
     c.each("members", &scene.members, Checker::member);
     c.each("details", &scene.details, |c, detail| {
         c.concrete_name(detail.concrete.as_deref());
+        if let Some(matter) = &detail.matter {
+            c.at("matter", |c| c.matter(matter));
+        }
         if let Some(body) = &detail.body {
             c.at("body", |c| c.body(body));
         }
@@ -56,6 +59,7 @@ pub fn check(scene: &SceneFile) -> Vec<Problem> {
         c.condition(detail.exposure.as_ref(), &detail.slices, &detail.truth);
     });
     c.at("project", |c| c.project(&scene.project));
+    c.at("georeference", |c| c.georeference(&scene.georeference));
     c.each("lamps", &scene.lamps, Checker::lamp);
     c.each("cameras", &scene.cameras, Checker::camera);
     c.each("meters", &scene.meters, Checker::meter);
@@ -993,25 +997,33 @@ impl Checker<'_> {
 
     pub(super) fn slices(&mut self, slices: &Slices) {
         match slices {
-            Slices::Files { name, images, pixel_mm, along, angle_deg, depth_m, diameter_mm } => {
-                self.text("name", name);
-                let given = [
-                    ("pixel_mm", pixel_mm, 1e-4, 100.0),
-                    ("along", along, 0.0, 1.0),
-                    ("angle_deg", angle_deg, -360.0, 360.0),
-                    ("depth_m", depth_m, 0.0, 100.0),
-                    ("diameter_mm", diameter_mm, 10.0, 2000.0),
-                ];
-                for (field, value, low, high) in given {
-                    value.iter().for_each(|v| _ = self.within(field, *v, low, high));
+            Slices::Files {
+                name,
+                images,
+                pixel_mm,
+                along,
+                angle_deg,
+                depth_m,
+                diameter_mm,
+                ..
+            } => {
+                pixel_mm.iter().for_each(|mm| _ = self.within("pixel_mm", *mm, 1e-4, 100.0));
+                self.of_files(name, images, [along, angle_deg, depth_m, diameter_mm]);
+            }
+            Slices::Stack {
+                name,
+                images,
+                voxel_mm,
+                along,
+                angle_deg,
+                depth_m,
+                diameter_mm,
+                ..
+            } => {
+                for (i, mm) in voxel_mm.iter().flatten().enumerate() {
+                    self.within(&format!("voxel_mm[{i}]"), *mm, 1e-4, 100.0);
                 }
-                if images.is_empty() {
-                    self.error("images", "EMPTY", "names no image");
-                }
-                images
-                    .iter()
-                    .enumerate()
-                    .for_each(|(i, file)| self.text(&format!("images[{i}]"), file));
+                self.of_files(name, images, [along, angle_deg, depth_m, diameter_mm]);
             }
             Slices::Drawn { name, count, size, pixel_mm, .. } => {
                 self.text("name", name);
@@ -1029,6 +1041,55 @@ impl Checker<'_> {
                     self.within(&format!("along[{i}]"), *at, 0.0, 1.0);
                 }
             }
+        }
+    }
+
+    /// What is no concrete must be something that bears.
+    pub(super) fn matter(&mut self, matter: &Matter) {
+        self.text("name", &matter.name);
+        self.within("modulus_gpa", matter.modulus_gpa, 1e-3, 1000.0);
+        self.within("poisson", matter.poisson, 0.0, 0.49);
+        self.within("density_kg_m3", matter.density_kg_m3, 1.0, 25_000.0);
+    }
+
+    fn georeference(&mut self, place: &Georeference) {
+        let map = place.map.iter().flat_map(|m| [m.eastings, m.northings, m.height]);
+        if !place.offset_m.into_iter().chain(map).all(|m| m.abs() < 1e8) {
+            self.error("", "RANGE", "a coordinate is not on earth: give metres below 1e8");
+        }
+        if place.map.as_ref().is_some_and(|m| {
+            let length = m.x_axis[0].hypot(m.x_axis[1]);
+            !(length.is_finite() && length > 0.0)
+        }) {
+            self.error("map.x_axis", "RANGE", "must be a direction: east and north, not both 0");
+        }
+        let degrees = [
+            ("latitude_deg", place.latitude_deg, 90.0),
+            ("longitude_deg", place.longitude_deg, 180.0),
+            ("elevation_m", place.elevation_m, 1e4),
+        ];
+        for (field, value, most) in degrees {
+            value.iter().for_each(|v| _ = self.within(field, *v as f32, -most, most));
+        }
+    }
+
+    /// What slices of files have in common: their place is along, angle, depth, diameter.
+    fn of_files(&mut self, name: &str, images: &[String], place: [&Option<f32>; 4]) {
+        self.text("name", name);
+        let fields = [
+            ("along", 0.0, 1.0),
+            ("angle_deg", -360.0, 360.0),
+            ("depth_m", 0.0, 100.0),
+            ("diameter_mm", 10.0, 2000.0),
+        ];
+        for ((field, low, high), value) in fields.into_iter().zip(place) {
+            value.iter().for_each(|v| _ = self.within(field, *v, low, high));
+        }
+        if images.is_empty() {
+            self.error("images", "EMPTY", "names no image");
+        }
+        for (i, file) in images.iter().enumerate() {
+            self.text(&format!("images[{i}]"), file);
         }
     }
 

@@ -5,7 +5,10 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{Body, Exposure, Pour, Reinforcement};
-use crate::Damage;
+use crate::{
+    AxisRuns, Damage,
+    structure::{Date, Matter},
+};
 
 /// A parametric member.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -73,6 +76,45 @@ pub enum Slices {
         /// Diameter of the core, mm; absent of whole sections.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         diameter_mm: Option<f32>,
+        /// Which way the member's axis runs in the pictures; if absent, they count as
+        /// cross-sections.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        axis: Option<AxisRuns>,
+        /// When it was drilled or sawn.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        date: Option<Date>,
+    },
+    /// A volume: slices that lie behind each other, read across and along.
+    Stack {
+        /// Name of the core.
+        name: String,
+        /// One file of all slices (MetaImage, TIFF of many pages, DICOM of many frames), or
+        /// patterns as of `Files`: slices in the order of the numbers in their names, a DICOM
+        /// series in the order of its places.
+        images: Vec<String>,
+        /// Edges of a voxel, mm: to the right, down, from slice to slice; if absent, what the
+        /// files tell.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        voxel_mm: Option<[f32; 3]>,
+        /// Where on the axis its middle lies, 0 to 1; if absent, it may have been anywhere.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        along: Option<f32>,
+        /// Direction from the axis in which the face lies that it was drilled into, in degrees.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        angle_deg: Option<f32>,
+        /// Depth of its middle below that face, m.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        depth_m: Option<f32>,
+        /// Diameter of the core, mm; absent of what was sawn.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        diameter_mm: Option<f32>,
+        /// Which way the member's axis runs in the pile of slices; if absent, a crack counts
+        /// whichever way it runs.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        axis: Option<AxisRuns>,
+        /// When it was drilled or sawn.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        date: Option<Date>,
     },
     /// Drawn from the planted truth, where no scanner would see through the member.
     Drawn {
@@ -106,9 +148,10 @@ impl Slices {
     /// Name of the core or sections.
     pub(crate) fn name(&self) -> &str {
         match self {
-            Self::Files { name, .. } | Self::Drawn { name, .. } | Self::Scanned { name, .. } => {
-                name
-            }
+            Self::Files { name, .. }
+            | Self::Stack { name, .. }
+            | Self::Drawn { name, .. }
+            | Self::Scanned { name, .. } => name,
         }
     }
 }
@@ -122,6 +165,9 @@ pub struct Detail {
     /// Its concrete.
     #[serde(default)]
     pub concrete: Option<String>,
+    /// Of a member that came with a model and is of no concrete: what it is of.
+    #[serde(default)]
+    pub matter: Option<Matter>,
     /// What attacks it.
     #[serde(default)]
     pub exposure: Option<Exposure>,

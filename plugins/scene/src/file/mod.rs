@@ -63,6 +63,9 @@ pub struct SceneFile {
     /// Whose structure it is, and why it is looked at: the cover of its report.
     #[serde(default)]
     pub project: Project,
+    /// Where it stands on earth.
+    #[serde(default)]
+    pub georeference: Georeference,
     /// What surfaces do with light.
     #[serde(default)]
     pub materials: Vec<Material>,

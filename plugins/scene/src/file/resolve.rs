@@ -96,6 +96,8 @@ fn said(file: &SceneFile) -> Structure {
             structure: named(&file.project.structure, &file.title),
             ..file.project.clone()
         },
+        georeference: file.georeference.clone(),
+        series: Vec::new(),
         assemblies: Vec::new(),
         concretes: file.concretes.clone(),
         supports: file.supports.clone(),
@@ -125,6 +127,7 @@ fn assembly(member: &super::Member) -> Assembly {
         frame: parametric::frame(member),
         concrete: member.concrete.clone().unwrap_or_else(|| ASSUMED_CONCRETE.into()),
         concrete_assumed: member.concrete.is_none(),
+        matter: None,
         pours: member.pours.clone(),
         exposure: member.exposure.clone(),
         steel: parametric::steel_lines(member),
@@ -409,19 +412,21 @@ impl Builder<'_> {
     /// Gives assemblies of models what details say of their bodies and their reinforcement.
     fn furnish(&mut self, name: &str, details: &[super::Detail]) -> Result<(), LoadError> {
         let Scene { structure, members, objects, meshes, .. } = &mut self.scene;
-        let said = |d: &super::Detail| d.body.is_some() || d.reinforcement.is_some();
+        let said =
+            |d: &super::Detail| d.body.is_some() || d.reinforcement.is_some() || d.matter.is_some();
         for (i, detail) in details.iter().enumerate().filter(|(_, d)| said(d)) {
             let mut own = Arc::make_mut(structure).assemblies.iter_mut();
             let assembly = own.find(|a| a.id == detail.member && a.body.is_none());
             let member = members.iter().position(|m| m.id == detail.member);
             let (Some(assembly), Some(index)) = (assembly, member) else {
-                let message = "a body and reinforcement are given here to members with a surface that a model brought: those of other members are told in members";
+                let message = "a body, a matter and reinforcement are given here to members with a surface that a model brought: those of other members are told in members";
                 return Err(LoadError::bad(
                     format!("{name}: details[{i}]"),
                     "NOT_OF_MODEL",
                     message,
                 ));
             };
+            assembly.matter.clone_from(&detail.matter);
             assembly.steel_assumed = detail.assumed.contains(&Assumed::Reinforcement);
             if let Some(body) = &detail.body {
                 assembly.steel.extend(parametric::lines_of(body, assembly.frame));
@@ -498,25 +503,52 @@ impl Builder<'_> {
                     angle_deg,
                     depth_m,
                     diameter_mm,
+                    axis,
+                    date,
                 } => {
                     let (images, masks) = super::slices::find(self.sources, folder, images, job)?;
                     let drilled = crate::Drilled {
+                        date: *date,
                         along: *along,
                         angle_deg: *angle_deg,
                         depth_m: *depth_m,
                         diameter_mm: *diameter_mm,
+                        axis: *axis,
                     };
-                    if along.is_none() {
-                        self.scene.warnings.push(format!(
-                            "slices \"{name}\": where on the member they lie is missing, so that they say little of any place; add along: 0 to 1"
-                        ));
-                    }
+                    self.scene.warnings.extend(placeless(name, *along));
                     crate::Slices::Files {
                         name: name.clone(),
                         images,
                         masks,
                         pixel_mm: *pixel_mm,
                         drilled,
+                    }
+                }
+                super::Slices::Stack {
+                    name,
+                    images,
+                    voxel_mm,
+                    along,
+                    angle_deg,
+                    depth_m,
+                    diameter_mm,
+                    axis,
+                    date,
+                } => {
+                    let (images, _) = super::slices::find(self.sources, folder, images, job)?;
+                    self.scene.warnings.extend(placeless(name, *along));
+                    crate::Slices::Stack {
+                        name: name.clone(),
+                        images,
+                        voxel_mm: *voxel_mm,
+                        drilled: crate::Drilled {
+                            date: *date,
+                            along: *along,
+                            angle_deg: *angle_deg,
+                            depth_m: *depth_m,
+                            diameter_mm: *diameter_mm,
+                            axis: *axis,
+                        },
                     }
                 }
             };
@@ -838,6 +870,15 @@ fn cuboid(size: Vec3) -> Mesh {
 }
 
 /// Checks of the shapes against closed forms.
+/// What to say of slices of which nobody knows where they lie.
+fn placeless(name: &str, along: Option<f32>) -> Option<String> {
+    along.is_none().then(|| {
+        format!(
+            "slices \"{name}\": where on the member they lie is missing, so that they say little of any place; add along: 0 to 1"
+        )
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -75,18 +75,18 @@ fn none(path: &Path, other: Option<&String>) -> LoadError {
             LoadError::bad(place, "NOT_A_SLICE", lost)
         }
         Some(_) => {
-            let message = "is neither TIFF, PNG nor MetaImage (.mha): convert it";
+            let message = "is neither TIFF, PNG, MetaImage (.mha) nor DICOM (.dcm): convert it";
             LoadError::bad(place, "NOT_A_SLICE", message)
         }
         None => {
-            let message = "no image (TIFF, PNG, .mha) has this name: check the path";
+            let message = "no image (.tif, .png, .mha, .dcm) has this name: check the path";
             LoadError::NoInput(Problem::error(place, "NO_INPUT", message))
         }
     }
 }
 
 pub(crate) fn is_image(file: &str) -> bool {
-    matches!(extension(file).as_deref(), Some("tif" | "tiff" | "png" | "mha"))
+    matches!(extension(file).as_deref(), Some("tif" | "tiff" | "png" | "mha" | "dcm"))
 }
 
 pub(crate) fn extension(file: &str) -> Option<String> {

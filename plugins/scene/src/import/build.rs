@@ -21,7 +21,7 @@ use crate::{
     Frame, Member, MemberKind, Mesh, Object, Part, SteelLine,
     gltf::Model,
     parametric,
-    structure::{ASSUMED_CONCRETE, Grade, Prestress, StrandGrade},
+    structure::{self, ASSUMED_CONCRETE, Grade, Prestress, StrandGrade},
 };
 
 /// A structure, built.
@@ -60,7 +60,7 @@ pub(super) struct Found {
     pub(super) exposure: Option<String>,
     pub(super) cover_mm: Option<f32>,
     /// A material of it that is no concrete.
-    pub(super) other: Option<String>,
+    pub(super) other: Option<structure::Matter>,
     pub(super) frame: Frame,
     pub(super) across: [f64; 2],
     pub(super) is_round: bool,
@@ -230,7 +230,7 @@ impl Builder {
             concrete,
             exposure: exposure(element),
             cover_mm: cover_mm(element, unit),
-            other: grade::other_matter(&element.materials).map(str::to_owned),
+            other: grade::other_matter(&element.materials),
             frame,
             across,
             is_round,

@@ -93,11 +93,8 @@ struct Shape {
 
 /// Reads an IFC file.
 pub(super) fn ifc(path: &Path, job: &Job) -> Result<Source, ImportError> {
-    look(path)?;
     let folder = tempfile::tempdir().map_err(|e| ImportError::write(&std::env::temp_dir(), &e))?;
-    let script = folder.path().join("ifc.py");
-    std::fs::write(&script, SCRIPT).map_err(|e| ImportError::write(&script, &e))?;
-    run(path, &script, folder.path(), &job.part(0.0, 0.8))?;
+    ifcopenshell(path, SCRIPT, folder.path(), &job.part(0.0, 0.8))?;
     let read = |name: &str| {
         let file = folder.path().join(name);
         access::read(&file, LONGEST_ANSWER)
@@ -106,6 +103,25 @@ pub(super) fn ifc(path: &Path, job: &Job) -> Result<Source, ImportError> {
     let answer: Answer = serde_json::from_slice(&read("elements.json")?)
         .map_err(|e| ImportError::bad(path, format!("IfcOpenShell's answer is damaged: {e}")))?;
     source(answer, &read("shapes.bin")?).map_err(|what| ImportError::bad(path, what))
+}
+
+/// Runs a Python `script` on an IFC file, with IfcOpenShell and a `folder` for its answer: `script
+/// MODEL.ifc FOLDER`. The script says lines of JSON: `{"done", "total", "what"}` now and then, at
+/// the end `{"ready": true}` or `{"fault", "message"}`.
+///
+/// # Errors
+/// The file is no IFC file, IfcOpenShell is not there or not new enough, it breaks off or is silent
+/// for long, or the job was cancelled.
+pub fn ifcopenshell(
+    path: &Path,
+    script: &str,
+    folder: &Path,
+    job: &Job,
+) -> Result<(), ImportError> {
+    look(path)?;
+    let place = folder.join("script.py");
+    std::fs::write(&place, script).map_err(|e| ImportError::write(&place, &e))?;
+    run(path, &place, folder, job)
 }
 
 /// Refuses what needs no converter to be refused: by size, by its first and its last line.
@@ -251,6 +267,7 @@ fn refused(path: &Path, fault: &str, message: &str) -> ImportError {
             "has no element with a shape: export the model with its geometry",
         ),
         "schema" => ImportError::bad(path, format!("{message}: export it as IFC4 or IFC2X3")),
+        "stranger" => ImportError::bad(path, message),
         _ => ImportError::bad(
             path,
             format!("IfcOpenShell cannot read it ({message}): export it again"),

@@ -3,7 +3,10 @@
 use serde_json::Value;
 
 use super::source::{Element, Matter};
-use crate::{file::concrete_class, structure::Grade};
+use crate::{
+    file::concrete_class,
+    structure::{self, Grade},
+};
 
 /// What a member is made of, as far as it is said.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,34 +39,22 @@ const CLASSES: [(u32, u32); 15] = [
 /// Classes of DIN 1045 (1978), by cubes, and those of today that DIN 1045-1 put in their place.
 const GERMAN: [(&str, u32); 5] = [("B15", 12), ("B25", 20), ("B35", 30), ("B45", 35), ("B55", 45)];
 
-/// Words of materials that are no concrete. Those of reinforced concrete are taken out before.
-const OTHERS: [&str; 26] = [
-    "wood",
-    "timber",
-    "holz",
-    "glulam",
-    "bois",
-    "steel",
-    "stahl",
-    "acier",
-    "acero",
-    "metal",
-    "metall",
-    "copper",
-    "alumin",
-    "glass",
-    "glas",
-    "masonry",
-    "mauerwerk",
-    "brick",
-    "ziegel",
-    "stone",
-    "granite",
-    "naturstein",
-    "soil",
-    "asphalt",
-    "insulation",
-    "dämmung",
+/// Words of materials that are no concrete, with what they are taken for: Young's modulus, GPa,
+/// Poisson's ratio, density, kg/m³. Words of reinforced concrete are taken out before.
+///
+/// Wood: C24 of EN 338, Poisson's ratio ours. Steel: EN 1993-1-1, 3.2.6; copper alike in stiffness
+/// to within a factor of two. Aluminium: EN 1999-1-1, 3.2.5. Glass: EN 572-1. Masonry: E = 1000 f_k
+/// of EN 1996-1-1, 3.7.2, with f_k = 5 MPa. Stone, soil, asphalt and insulation: ours.
+const OTHERS: [(&[&str], [f32; 3]); 9] = [
+    (&["wood", "timber", "holz", "glulam", "bois"], [11.0, 0.3, 420.0]),
+    (&["alumin"], [70.0, 0.3, 2700.0]),
+    (&["steel", "stahl", "acier", "acero", "metal", "copper"], [210.0, 0.3, 7850.0]),
+    (&["glass", "glas"], [70.0, 0.23, 2500.0]),
+    (&["masonry", "mauerwerk", "brick", "ziegel"], [5.0, 0.2, 1800.0]),
+    (&["stone", "granite", "naturstein"], [40.0, 0.25, 2600.0]),
+    (&["asphalt"], [3.0, 0.35, 2400.0]),
+    (&["soil"], [0.05, 0.3, 1900.0]),
+    (&["insulation", "dämmung"], [0.01, 0.2, 50.0]),
 ];
 const CONCRETES: [&str; 8] =
     ["stahlbeton", "reinforced", "concrete", "beton", "béton", "hormig", "calcestruzzo", "betong"];
@@ -158,18 +149,22 @@ fn first_number(text: &str) -> Option<f64> {
     rest.get(..end)?.parse().ok()
 }
 
-/// A material that is surely no concrete.
-pub(super) fn other_matter(materials: &[Matter]) -> Option<&str> {
+/// A material that is surely no concrete, with what it is taken for.
+pub(super) fn other_matter(materials: &[Matter]) -> Option<structure::Matter> {
     let is_concrete = |text: &str| CONCRETES.iter().any(|word| text.contains(word));
-    let no_concrete = |m: &&Matter| {
+    let other = |m: &Matter| {
         let text = format!("{} {}", m.name, m.category).to_lowercase();
-        !is_concrete(&text) && OTHERS.iter().any(|word| text.contains(word))
+        let is_it = |(words, _): &&(&[&str], [f32; 3])| words.iter().any(|w| text.contains(w));
+        let (_, [modulus_gpa, poisson, density_kg_m3]) = *OTHERS.iter().find(is_it)?;
+        let name = m.name.clone();
+        let matter = structure::Matter { name, modulus_gpa, poisson, density_kg_m3 };
+        (!is_concrete(&text)).then_some(matter)
     };
     let concrete = |m: &Matter| is_concrete(&m.name.to_lowercase());
     if materials.iter().any(concrete) {
         return None;
     }
-    materials.iter().find(no_concrete).map(|m| m.name.as_str())
+    materials.iter().find_map(other)
 }
 
 /// The grade of a bar: by its attribute, its materials, its names.

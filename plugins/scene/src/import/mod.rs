@@ -22,6 +22,8 @@ mod project;
 mod shape;
 mod source;
 
+pub use convert::ifcopenshell;
+
 use std::{
     collections::BTreeMap,
     fs, io,
@@ -102,12 +104,16 @@ impl ImportError {
         Self::BadInput(format!("{}: {}", path.display(), what.as_ref()))
     }
 
-    fn denied(path: &Path, why: &Denied) -> Self {
+    /// A file that cannot be opened.
+    #[must_use]
+    pub fn denied(path: &Path, why: &Denied) -> Self {
         let line = format!("{}: {why}", path.display());
         if why.is_missing() { Self::NoInput(line) } else { Self::BadInput(line) }
     }
 
-    fn write(path: &Path, error: &io::Error) -> Self {
+    /// A file or folder that cannot be written.
+    #[must_use]
+    pub fn write(path: &Path, error: &io::Error) -> Self {
         Self::CannotWrite(format!("{}: cannot be written: {error}", path.display()))
     }
 }

@@ -23,7 +23,7 @@ use crate::{
     Camera, MemberKind, Scene,
     file::{Assumed, concrete_class, evidence},
     gltf,
-    structure::{Bars, Reinforcement},
+    structure::{Bars, Georeference, MapOrigin, Matter, Reinforcement},
 };
 
 /// The geometry's name in the folder.
@@ -106,18 +106,22 @@ fn detail<'a>(found: &'a Found, year: Option<i32>, told: &Told) -> Detail<'a> {
         Some(Concrete::Class(class)) => (class.clone(), None),
         Some(Concrete::Strength(mpa)) => (format!("fck {mpa} MPa"), Some(*mpa)),
         None => {
-            assumed.push(Assumed::Concrete);
+            if found.other.is_none() {
+                assumed.push(Assumed::Concrete);
+            }
             (assume::concrete(year).to_owned(), None)
         }
     };
     let exposure = found.exposure.clone().or(told.exposure.clone()).unwrap_or_else(|| {
-        assumed.push(Assumed::Exposure);
+        if found.other.is_none() {
+            assumed.push(Assumed::Exposure);
+        }
         assume::exposure(found.kind).to_owned()
     });
     let years = year.and_then(|y| {
         (i32::try_from(this_year()).ok()? >= y).then_some(this_year() as f32 - y as f32)
     });
-    if years.is_none() {
+    if years.is_none() && found.other.is_none() {
         assumed.push(Assumed::Age);
     }
     let fck = strength.or(concrete_class(&concrete)).unwrap_or(30.0);
@@ -245,8 +249,11 @@ fn loads(members: &[Detail], told: &Told) -> String {
 }
 
 fn concretes(members: &[Detail]) -> String {
-    let own: BTreeMap<&str, f32> =
-        members.iter().filter_map(|m| Some((m.concrete.as_str(), m.strength?))).collect();
+    let own: BTreeMap<&str, f32> = members
+        .iter()
+        .filter(|m| m.found.other.is_none())
+        .filter_map(|m| Some((m.concrete.as_str(), m.strength?)))
+        .collect();
     if own.is_empty() {
         return String::new();
     }
@@ -268,14 +275,25 @@ fn detail_text(member: &Detail) -> String {
         found.volume,
         if found.steel > 0 { format!(", {} bars", found.steel) } else { String::new() }
     );
-    let _ = write!(
-        text,
-        "        (member: {}, concrete: {}, exposure: (class: {}, years: {})",
-        quoted(&found.id),
-        quoted(&member.concrete),
-        quoted(&member.exposure),
-        member.years
-    );
+    let _ = match &found.other {
+        Some(matter) => write!(
+            text,
+            "        (member: {}, matter: (name: {}, modulus_gpa: {}, poisson: {}, density_kg_m3: {})",
+            quoted(&found.id),
+            quoted(&matter.name),
+            matter.modulus_gpa,
+            matter.poisson,
+            matter.density_kg_m3
+        ),
+        None => write!(
+            text,
+            "        (member: {}, concrete: {}, exposure: (class: {}, years: {})",
+            quoted(&found.id),
+            quoted(&member.concrete),
+            quoted(&member.exposure),
+            member.years
+        ),
+    };
     if let Some(tube) = &found.tube {
         let (thickness, length) = (tube.outer - tube.inner, tube.axis.length());
         let laid =
@@ -401,33 +419,77 @@ fn along_axis(axis: Vec3) -> String {
     format!("Springs(stiffness_mpa_m: {})", vector(stiffness))
 }
 
-/// Where the model lies on earth, for who puts results back on a map.
-fn georeference(source: &Source, built: &Built) -> String {
-    let mut lines = Vec::new();
-    let offset = built.offset;
-    if offset != glam::DVec3::ZERO {
-        lines.push(format!(
-            "coordinates here are those of the file (y up) less ({}, {}, {}) m",
-            offset.x, offset.y, offset.z
-        ));
+/// Where the model lies on earth, for who puts results back on it or on a map.
+fn place(source: &Source, built: &Built) -> Georeference {
+    let found = &source.georeference;
+    Georeference {
+        offset_m: built.offset.to_array(),
+        map: found.map.as_ref().map(|map| MapOrigin {
+            crs: map.crs.clone(),
+            eastings: map.eastings,
+            northings: map.northings,
+            height: map.height,
+            x_axis: [map.abscissa.unwrap_or(1.0), map.ordinate.unwrap_or(0.0)],
+        }),
+        latitude_deg: found.latitude,
+        longitude_deg: found.longitude,
+        elevation_m: found.elevation,
     }
-    let place = &source.georeference;
+}
+
+/// The field of the scene that says so; nothing where nothing is known.
+fn georeference(source: &Source, built: &Built) -> String {
+    let place = place(source, built);
+    if place == Georeference::default() {
+        return String::new();
+    }
+    let mut fields = vec![format!("offset_m: {}", numbers(&place.offset_m))];
     if let Some(map) = &place.map {
-        lines.push(format!(
-            "the file's origin is at {:.3} E, {:.3} N, {:.3} m in {}, its x axis along ({}, {})",
+        fields.push(format!(
+            "map: (crs: {:?}, eastings: {}, northings: {}, height: {}, x_axis: {})",
+            map.crs,
             map.eastings,
             map.northings,
             map.height,
-            if map.crs.is_empty() { "an unnamed reference system" } else { &map.crs },
-            map.abscissa.unwrap_or(1.0),
-            map.ordinate.unwrap_or(0.0)
+            numbers(&map.x_axis)
         ));
     }
-    if let (Some(latitude), Some(longitude)) = (place.latitude, place.longitude) {
-        let height = place.elevation.map_or(String::new(), |e| format!(", {e} m"));
+    let rest = [
+        ("latitude_deg", place.latitude_deg),
+        ("longitude_deg", place.longitude_deg),
+        ("elevation_m", place.elevation_m),
+    ];
+    fields.extend(rest.iter().filter_map(|(name, v)| Some(format!("{name}: {}", (*v)?))));
+    format!("    georeference: ({}),\n", fields.join(", "))
+}
+
+/// A tuple of RON.
+fn numbers(values: &[f64]) -> String {
+    format!("({})", values.iter().map(f64::to_string).collect::<Vec<_>>().join(", "))
+}
+
+/// Where the model lies on earth, in sentences.
+fn whereabouts(source: &Source, built: &Built) -> Vec<String> {
+    let (place, mut lines) = (place(source, built), Vec::new());
+    if place.offset_m != [0.0; 3] {
+        let offset = numbers(&place.offset_m);
+        lines.push(format!("coordinates here are those of the file (y up) less {offset} m"));
+    }
+    if let Some(map) = &place.map {
+        let crs = if map.crs.is_empty() { "an unnamed reference system" } else { &map.crs };
+        lines.push(format!(
+            "the file's origin is at {:.3} E, {:.3} N, {:.3} m in {crs}, its x axis along {}",
+            map.eastings,
+            map.northings,
+            map.height,
+            numbers(&map.x_axis)
+        ));
+    }
+    if let (Some(latitude), Some(longitude)) = (place.latitude_deg, place.longitude_deg) {
+        let height = place.elevation_m.map_or(String::new(), |e| format!(", {e} m"));
         lines.push(format!("the site is at {latitude:.6}° N, {longitude:.6}° E{height}"));
     }
-    lines.iter().map(|line| format!("    // Georeference: {}\n", comment(line))).collect()
+    lines
 }
 
 /// A file for evidence that is still to come; its examples are of the first member.
@@ -445,14 +507,15 @@ fn summary(folder: &Path, source: &Source, built: &Built, members: &[Detail]) ->
     }
     let count = |what: Assumed| members.iter().filter(|m| m.assumed.contains(&what)).count();
     let mut notes: Vec<String> = source.notes.iter().chain(&built.notes).cloned().collect();
-    let others: BTreeMap<&str, usize> =
-        built.found.iter().filter_map(|f| f.other.as_deref()).fold(BTreeMap::new(), |mut m, o| {
-            *m.entry(o).or_default() += 1;
+    let others: BTreeMap<&str, (usize, &Matter)> =
+        built.found.iter().filter_map(|f| f.other.as_ref()).fold(BTreeMap::new(), |mut m, o| {
+            m.entry(o.name.as_str()).or_insert((0, o)).0 += 1;
             m
         });
-    for (material, count) in others {
+    for (count, matter) in others.into_values() {
         notes.push(format!(
-            "{count} members are of {material}, which is no concrete: they are computed as concrete all the same"
+            "{count} members are of {}, which is no concrete: they bear with E = {} GPa and {} kg/m³, and nothing is foretold of them",
+            matter.name, matter.modulus_gpa, matter.density_kg_m3
         ));
     }
     if built.steel.loose > 0 {
@@ -510,12 +573,12 @@ fn readme(
     );
     text += &rules(built, members, imported, told.year.or(source.year), told);
     text += "\n## Place\n\n";
-    let place = georeference(source, built);
+    let place = whereabouts(source, built);
     if place.is_empty() {
         text += "The file says nothing of where it lies on earth.\n";
     }
-    for line in place.lines() {
-        let _ = writeln!(text, "- {}", line.trim().trim_start_matches("// Georeference: "));
+    for line in place {
+        let _ = writeln!(text, "- {}", comment(&line));
     }
     text += "\n## Remarks\n\n";
     for note in imported.notes.iter().chain(&scene.warnings) {

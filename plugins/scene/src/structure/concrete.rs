@@ -3,6 +3,20 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+/// What a member is of that is no concrete. It bears by these; nothing is foretold of it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Matter {
+    /// What people call it, such as `Steel S355`.
+    pub name: String,
+    /// Young's modulus, GPa; of wood along the grain.
+    pub modulus_gpa: f32,
+    /// Poisson's ratio.
+    pub poisson: f32,
+    /// kg/m³.
+    pub density_kg_m3: f32,
+}
+
 /// A concrete that is no class of Eurocode 2.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

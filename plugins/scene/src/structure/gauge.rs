@@ -4,6 +4,8 @@ use glam::Vec3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::Date;
+
 /// A gauge on or in a member.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -44,6 +46,28 @@ pub enum Direction {
     Radial,
     /// Around the axis.
     Hoop,
+}
+
+/// What a gauge read over months and years, oldest first.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Series {
+    /// Name of the gauge.
+    pub gauge: String,
+    /// Its readings.
+    pub samples: Vec<Sample>,
+}
+
+/// What a gauge read on a day, against what it read when it was set to nought.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sample {
+    /// When.
+    pub date: Date,
+    /// In SI units.
+    pub value: f64,
+    /// Of the value.
+    pub std_error: f64,
+    /// Of the concrete there, °C.
+    pub temperature_c: Option<f64>,
 }
 
 /// What a gauge or a meter was read to show.

@@ -7,6 +7,7 @@ mod body;
 mod concrete;
 mod date;
 mod gauge;
+mod georeference;
 mod grade;
 mod observation;
 mod project;
@@ -19,6 +20,7 @@ pub use body::*;
 pub use concrete::*;
 pub use date::{Date, DateError};
 pub use gauge::*;
+pub use georeference::{Georeference, MapOrigin};
 pub use grade::{Grade, StrandGrade};
 pub use observation::*;
 pub use project::Project;
@@ -34,6 +36,8 @@ pub const ASSUMED_CONCRETE: &str = "C30/37";
 pub struct Structure {
     /// Whose it is, and why it is looked at.
     pub project: Project,
+    /// Where it stands on earth, as far as its model says so.
+    pub georeference: Georeference,
     /// What is computed as one, each with its members.
     pub assemblies: Vec<Assembly>,
     /// Concretes that are no class of Eurocode 2.
@@ -50,6 +54,8 @@ pub struct Structure {
     pub gauges: Vec<Gauge>,
     /// What gauges and meters were read to show on site.
     pub readings: Vec<Reading>,
+    /// What gauges read over the years, a series each, in the order of the files.
+    pub series: Vec<Series>,
     /// What was measured or seen on members, in the order of the files and of their entries.
     pub observations: Vec<Observation>,
     /// X-ray scanners.
@@ -79,6 +85,8 @@ pub struct Assembly {
     pub concrete: String,
     /// Whether it had to be assumed.
     pub concrete_assumed: bool,
+    /// What it is of where that is no concrete; `concrete` says nothing then.
+    pub matter: Option<Matter>,
     /// When its parts were poured. One pour at day 0 where there is none.
     pub pours: Vec<Pour>,
     /// What attacks it.
@@ -172,6 +180,7 @@ impl Assembly {
             frame: member.frame,
             concrete: member.concrete.clone(),
             concrete_assumed: member.concrete_assumed,
+            matter: None,
             pours: Vec::new(),
             exposure: member.exposure.clone(),
             steel: Vec::new(),

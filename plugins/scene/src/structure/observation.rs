@@ -1,7 +1,7 @@
 //! What was measured or seen on a member: instruments held to it, cores taken from it, findings of
 //! an inspection. What it says of damage is not told here.
 
-use std::fmt;
+use std::{fmt, path::PathBuf};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -21,6 +21,8 @@ pub struct Observation {
     pub spot: Spot,
     /// What it was measured with, for people.
     pub instrument: Option<String>,
+    /// A photograph of it, JPEG or PNG.
+    pub picture: Option<PathBuf>,
     /// What was found.
     pub shows: Shows,
 }

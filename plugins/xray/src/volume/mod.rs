@@ -5,6 +5,7 @@
 //! ([`Reader::read_slab`], [`Writer::write_slab`]): 1024³ voxels never need to be in memory at
 //! once.
 
+mod dicom;
 mod metaimage;
 mod picture;
 mod read;

@@ -11,6 +11,7 @@ use intrados_stage::{Access, Job};
 
 use super::{
     Grid, MAX_SIDE, Volume, VolumeError,
+    dicom::{self, Series},
     metaimage::{self, Raw},
     picture::{self, Pages, Picture},
 };
@@ -30,6 +31,7 @@ enum Source {
     /// One TIFF, one page a slice. The decoder is away only while a page is read.
     Pages(Option<Box<Pages>>, u64),
     Raw(Raw),
+    Dicom(Series),
 }
 
 impl std::fmt::Debug for Reader {
@@ -42,8 +44,9 @@ impl std::fmt::Debug for Reader {
 }
 
 impl Reader {
-    /// Opens a MetaImage (`.mhd`, `.mha`), a TIFF of one or more pages, a PNG, or a folder of TIFF
-    /// or PNG slices (in the order of the numbers in their names). `voxel` (m) overrides what the
+    /// Opens a MetaImage (`.mhd`, `.mha`), a TIFF of one or more pages, a PNG, a DICOM file, or a
+    /// folder of TIFF or PNG slices (in the order of the numbers in their names) or of a DICOM
+    /// series (in the order of their places). `voxel` (m) overrides what the
     /// file tells; where no file tells it must be given.
     ///
     /// # Errors
@@ -63,7 +66,10 @@ impl Reader {
         access: &Access,
     ) -> Result<Self, VolumeError> {
         if path.is_dir() {
-            return Self::files(pictures_in(path)?, voxel);
+            return Self::files(slices_in(path)?, voxel);
+        }
+        if dicom::is_dicom(path) {
+            return Self::dicom(&[path.to_owned()], voxel);
         }
         let extension = path.extension().and_then(OsStr::to_str).unwrap_or_default();
         if ["mhd", "mha"].iter().any(|e| extension.eq_ignore_ascii_case(e)) {
@@ -81,6 +87,21 @@ impl Reader {
         }
     }
 
+    /// Slices in files of their own, in the order of the numbers in their names (of a DICOM
+    /// series: of their places); or the one file of all slices.
+    ///
+    /// # Errors
+    /// As [`Reader::open`].
+    pub fn pile(mut files: Vec<PathBuf>, voxel: Option<[f64; 3]>) -> Result<Self, VolumeError> {
+        match &files[..] {
+            [file] => Self::open(file, voxel),
+            _ => {
+                files.sort_by(|a, b| natural(&a.to_string_lossy(), &b.to_string_lossy()));
+                Self::files(files, voxel)
+            }
+        }
+    }
+
     /// Slices in files of their own, in the order given.
     ///
     /// # Errors
@@ -95,6 +116,9 @@ impl Reader {
                 &first,
                 format!("is one of {} slices; at most {MAX_SIDE} are read", files.len()),
             ));
+        }
+        if dicom::is_dicom(&first) {
+            return Self::dicom(&files, voxel);
         }
         let (mut told, mut pixel) = (None, None);
         let mut size = None;
@@ -120,6 +144,16 @@ impl Reader {
             path: first,
             told: told.map(|[x, y, _]| [x, y]).or(pixel),
         })
+    }
+
+    fn dicom(files: &[PathBuf], voxel: Option<[f64; 3]>) -> Result<Self, VolumeError> {
+        let (series, grid, [pixel, all]) = dicom::open(files)?;
+        let path = files[0].clone();
+        let told = pixel.then_some([grid.voxel[0], grid.voxel[1]]);
+        // A single slice needs no distance to the next one.
+        let known = (pixel && (all || grid.size[2] == 1)).then_some(grid.voxel);
+        let grid = Grid::centred(grid.size, known_voxel(&path, voxel, known)?);
+        Ok(Self { source: Source::Dicom(series), grid, path, told })
     }
 
     fn pages(
@@ -210,6 +244,7 @@ impl Reader {
         let size = [self.grid.size[0], self.grid.size[1]];
         match &mut self.source {
             Source::Raw(raw) => raw.slice(z, self.grid.size),
+            Source::Dicom(series) => series.slice(z, size),
             Source::Pages(pages, length) => {
                 // A page that could not be read took the decoder with it; the others may be sound.
                 let decoder = match pages.take() {
@@ -263,24 +298,29 @@ fn known_voxel(
     }
 }
 
-fn pictures_in(folder: &Path) -> Result<Vec<PathBuf>, VolumeError> {
+/// The pictures of a folder, or where there are none its DICOM files.
+fn slices_in(folder: &Path) -> Result<Vec<PathBuf>, VolumeError> {
     let missing = VolumeError::missing(folder);
     let entries = std::fs::read_dir(folder).map_err(&missing)?;
     let mut files = entries
         .map(|entry| entry.map(|e| e.path()))
         .collect::<Result<Vec<_>, _>>()
         .map_err(&missing)?;
+    files.sort_by(|a, b| natural(&a.to_string_lossy(), &b.to_string_lossy()));
     let is_picture = |p: &PathBuf| {
         let extension = p.extension().and_then(OsStr::to_str).unwrap_or_default();
         ["tif", "tiff", "png"].iter().any(|e| extension.eq_ignore_ascii_case(e))
     };
-    files.retain(is_picture);
-    files.sort_by(|a, b| natural(&a.to_string_lossy(), &b.to_string_lossy()));
-    match files.is_empty() {
-        true => {
-            Err(VolumeError::bad(folder, "holds no slices; expected .tif, .tiff or .png files"))
-        }
-        false => Ok(files),
+    let mut found: Vec<PathBuf> = files.iter().filter(|p| is_picture(p)).cloned().collect();
+    if found.is_empty() {
+        found.extend(files.into_iter().filter(|p| dicom::is_dicom(p)));
+    }
+    match found.is_empty() {
+        true => Err(VolumeError::bad(
+            folder,
+            "holds no slices; expected .tif, .tiff or .png files, or a DICOM series",
+        )),
+        false => Ok(found),
     }
 }
 

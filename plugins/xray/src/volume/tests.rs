@@ -376,3 +376,123 @@ fn pictures_tell_the_size_of_their_pixels() {
         Some([1e5, 2e5])
     );
 }
+
+/// A DICOM file by PS3.10, explicit VR, little endian: elements as (group, element, VR, value).
+fn dicom(elements: &[(u16, u16, &str, Vec<u8>)]) -> Vec<u8> {
+    let element = |&(group, element, vr, ref value): &(u16, u16, &str, Vec<u8>)| {
+        let mut value = value.clone();
+        if value.len() % 2 == 1 {
+            value.push(if vr == "UI" { 0 } else { b' ' });
+        }
+        let mut bytes = [group.to_le_bytes(), element.to_le_bytes()].concat();
+        bytes.extend(vr.bytes());
+        match vr {
+            "OW" | "OB" => {
+                bytes.extend([0, 0]);
+                bytes.extend((value.len() as u32).to_le_bytes());
+            }
+            _ => bytes.extend((value.len() as u16).to_le_bytes()),
+        }
+        bytes.extend(value);
+        bytes
+    };
+    let text = |t: &str| t.as_bytes().to_vec();
+    let meta = [
+        (2, 1, "OB", vec![0, 1]),
+        (2, 2, "UI", text("1.2.840.10008.5.1.4.1.1.2")),
+        (2, 3, "UI", text("1.2.3.4")),
+        (2, 0x10, "UI", text("1.2.840.10008.1.2.1")),
+        (2, 0x12, "UI", text("1.2.3")),
+    ];
+    let meta: Vec<u8> = meta.iter().flat_map(element).collect();
+    let mut file = vec![0; 128];
+    file.extend(b"DICM");
+    file.extend(element(&(2, 0, "UL", (meta.len() as u32).to_le_bytes().to_vec())));
+    file.extend(meta);
+    file.extend(elements.iter().flat_map(element));
+    file
+}
+
+/// A slice of 3 × 2 pixels at height `z` mm whose stored values begin with `first`.
+fn slice(z: f64, series: &str, first: i16) -> Vec<u8> {
+    let text = |t: &str| t.as_bytes().to_vec();
+    let short = |n: u16| n.to_le_bytes().to_vec();
+    let pixels = (0..6).flat_map(|i| (first + i).to_le_bytes()).collect();
+    dicom(&[
+        (8, 0x60, "CS", text("CT")),
+        (0x20, 0xE, "UI", text(series)),
+        (0x20, 0x32, "DS", text(&format!("0\\0\\{z}"))),
+        (0x20, 0x37, "DS", text("1\\0\\0\\0\\1\\0")),
+        (0x28, 2, "US", short(1)),
+        (0x28, 4, "CS", text("MONOCHROME2")),
+        (0x28, 0x10, "US", short(2)),
+        (0x28, 0x11, "US", short(3)),
+        (0x28, 0x30, "DS", text("0.25\\0.5")),
+        (0x28, 0x100, "US", short(16)),
+        (0x28, 0x101, "US", short(16)),
+        (0x28, 0x102, "US", short(15)),
+        (0x28, 0x103, "US", short(1)),
+        (0x28, 0x1052, "DS", text("-1024")),
+        (0x28, 0x1053, "DS", text("2")),
+        (0x28, 0x1054, "LO", text("HU")),
+        (0x7FE0, 0x10, "OW", pixels),
+    ])
+}
+
+/// Files in any order are sorted by their places; Hounsfield units become attenuation over that of
+/// water.
+#[test]
+fn a_dicom_series_is_a_volume() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, z, first) in [("a", 12.0, 512), ("b.dcm", 10.0, 12), ("c", 11.0, -600)] {
+        fs::write(folder.path().join(name), slice(z, "9.1", first)).unwrap();
+    }
+    let mut reader = Reader::open(folder.path(), None).unwrap();
+    assert_eq!(reader.grid().size, [3, 2, 3]);
+    assert!(
+        reader.grid().voxel.iter().zip([5e-4, 2.5e-4, 1e-3]).all(|(a, b)| (a - b).abs() < 1e-12)
+    );
+    let volume = reader.read(&Job::default()).unwrap();
+    // 1 + (2 v − 1024)/1000, and nothing below air.
+    let expected = [[12, 15], [-600, -597], [512, 515]]
+        .map(|row| row.map(|v| (1.0 + 1e-3 * (2.0 * f64::from(v) - 1024.0)).max(0.0)));
+    for (z, [first, second_row]) in expected.into_iter().enumerate() {
+        let found = [volume.slice(z)[0], volume.slice(z)[3]].map(f64::from);
+        assert!(
+            (found[0] - first).abs() < 1e-6 && (found[1] - second_row).abs() < 1e-6,
+            "{found:?}"
+        );
+    }
+    // A single one needs no neighbour.
+    let single = Reader::open(&folder.path().join("b.dcm"), None).unwrap();
+    assert_eq!((single.grid().size[2], single.told_pixel()), (1, Some([5e-4, 2.5e-4])));
+}
+
+#[test]
+fn dicom_that_is_no_volume_is_refused_with_the_reason() {
+    let refused = |files: &[(&str, Vec<u8>)]| {
+        let folder = tempfile::tempdir().unwrap();
+        files.iter().for_each(|(name, bytes)| fs::write(folder.path().join(name), bytes).unwrap());
+        let read = Reader::open(folder.path(), None).and_then(|mut r| r.read(&Job::default()));
+        let line = read.unwrap_err().to_string();
+        assert!(!line.contains('\n'), "{line}");
+        line
+    };
+    let at = |z| slice(z, "9.1", 0);
+    let gap = refused(&[("a", at(0.0)), ("b", at(1.0)), ("c", at(3.0))]);
+    assert!(gap.contains("gap"), "{gap}");
+    let twice = refused(&[("a", at(1.0)), ("b", at(1.0))]);
+    assert!(twice.contains("at one place"), "{twice}");
+    let other = refused(&[("a", at(1.0)), ("b", slice(2.0, "9.2", 0))]);
+    assert!(other.contains("another series"), "{other}");
+    let whole = at(0.0);
+    for length in (132..whole.len()).step_by(7) {
+        _ = refused(&[("cut", whole[..length].to_vec())]);
+    }
+    let mut jpeg2000 = whole.clone();
+    let uid = b"1.2.840.10008.1.2.1";
+    let i = jpeg2000.windows(uid.len()).position(|w| w == uid).unwrap();
+    jpeg2000[i + 18] = b'9';
+    let line = refused(&[("a", jpeg2000)]);
+    assert!(line.contains("export it uncompressed") || line.contains("damaged"), "{line}");
+}

@@ -281,7 +281,7 @@ impl Checker<'_> {
             self.error("slices", "EMPTY", "names no slices: give Files(…)");
         }
         self.each("slices", &m.slices, |c, slices| match slices {
-            Slices::Files { .. } => c.slices(slices),
+            Slices::Files { .. } | Slices::Stack { .. } => c.slices(slices),
             Slices::Drawn { .. } | Slices::Scanned { .. } => {
                 let message = "is no evidence: slices that are drawn or scanned from the planted \
                                truth belong into the scene; name the files of real ones";

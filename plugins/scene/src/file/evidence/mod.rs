@@ -11,7 +11,10 @@ mod face;
 mod place;
 mod table;
 
-use std::path::{Path, PathBuf};
+use std::{
+    collections::HashMap,
+    path::{Path, PathBuf},
+};
 
 use intrados_stage::Job;
 use schemars::JsonSchema;
@@ -96,6 +99,9 @@ pub struct Record {
     /// What it was measured with, for people.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub instrument: Option<String>,
+    /// A photograph of it for the report, JPEG or PNG, relative to this file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub picture: Option<String>,
     /// What was found.
     pub shows: Finding,
 }
@@ -359,6 +365,8 @@ pub(crate) struct Evidence {
     pub(crate) records: Vec<Placed<Record>>,
     /// Rows of its tables of gauges.
     pub(crate) readings: Vec<Placed<RawReading>>,
+    /// Photographs that it names, and where they are.
+    pub(crate) pictures: HashMap<String, PathBuf>,
 }
 
 /// A file of evidence in which nothing is said yet: of what (`name`), with examples for the member
@@ -413,10 +421,12 @@ pub(crate) fn gather(
         match parse(&name, &text) {
             Ok(file) => {
                 let folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
-                all.push(Evidence::of(name, folder, file, problems, |folder, text| {
+                let mut one = Evidence::of(name, folder, file, problems, |folder, text| {
                     let path = sources.path_from(folder, text)?;
                     Ok((path.display().to_string(), sources.read(&path, MAX_TABLE)?))
-                })?);
+                })?;
+                one.find_pictures(sources, job)?;
+                all.push(one);
             }
             Err(problem) => problems.push(problem),
         }
@@ -425,6 +435,18 @@ pub(crate) fn gather(
 }
 
 impl Evidence {
+    /// Finds the photographs that it names, which go into the hash.
+    fn find_pictures(&mut self, sources: &mut Sources, job: &Job) -> Result<(), LoadError> {
+        for (i, record) in self.file.items.iter().enumerate() {
+            let Some(text) = &record.picture else { continue };
+            let place = format!("{}: items[{i}].picture", self.name);
+            let path = sources.path_from(&self.folder, text).map_err(|e| e.under(&place))?;
+            sources.hash_file(&path, job).map_err(|e| e.under(&place))?;
+            self.pictures.insert(text.clone(), path);
+        }
+        Ok(())
+    }
+
     /// Checks a file, and reads its tables by `open`, which gives a table's name in messages and its
     /// bytes for the folder of the file and the path in it.
     ///
@@ -449,7 +471,8 @@ impl Evidence {
             what: record.clone(),
         };
         let records = file.items.iter().enumerate().map(item).collect();
-        let mut evidence = Self { records, readings: Vec::new(), name, folder, file };
+        let (readings, pictures) = (Vec::new(), HashMap::new());
+        let mut evidence = Self { records, readings, pictures, name, folder, file };
         for (i, survey) in evidence.file.tables.iter().enumerate().filter(|_| sound) {
             let place = format!("{}: tables[{i}].file", evidence.name);
             let (name, bytes) =

@@ -12,7 +12,7 @@ use crate::{
     Member, Scene,
     file::{nearest, shorten},
     problem::Problem,
-    structure::{Gauge, Measures, Observation, Reading, Shows, Spot, usual},
+    structure::{Gauge, Measures, Observation, Reading, Sample, Series, Shows, Spot, usual},
 };
 
 /// How many problems are listed before the list is cut.
@@ -36,7 +36,7 @@ pub(crate) fn place(scene: &mut Scene, evidence: &Evidence) -> Result<(), Vec<Pr
     found.lists(evidence);
     evidence.records.iter().for_each(|record| found.record(record));
     evidence.readings.iter().for_each(|reading| found.reading(reading));
-    let Placing { problems, observations, gauges, readings, warnings, .. } = found;
+    let Placing { problems, observations, gauges, readings, mut series, warnings, .. } = found;
     if !problems.is_empty() {
         return Err(problems);
     }
@@ -47,6 +47,8 @@ pub(crate) fn place(scene: &mut Scene, evidence: &Evidence) -> Result<(), Vec<Pr
     structure.gauges.extend(gauges);
     structure.readings.extend(evidence.file.readings.iter().cloned());
     structure.readings.extend(readings);
+    series.iter_mut().for_each(|s| s.samples.sort_by_key(|sample| sample.date));
+    structure.series.extend(series);
     structure.observations.extend(observations);
     Ok(())
 }
@@ -70,6 +72,7 @@ struct Placing<'a> {
     /// Gauges that tables define.
     gauges: Vec<Gauge>,
     readings: Vec<Reading>,
+    series: Vec<Series>,
     warnings: Vec<String>,
 }
 
@@ -90,6 +93,7 @@ impl<'a> Placing<'a> {
             observations: Vec::new(),
             gauges: Vec::new(),
             readings: Vec::new(),
+            series: Vec::new(),
             warnings: Vec::new(),
         }
     }
@@ -276,6 +280,17 @@ impl<'a> Placing<'a> {
             };
             let message = format!("{} measures {right}, not in {}", gauge.name, what.unit.name());
             self.error(reading.field("value"), "UNIT", message);
+        } else if let (Some(date), None) = (what.date, &what.test) {
+            let sample = Sample {
+                date,
+                value: what.value,
+                std_error: what.std_error,
+                temperature_c: what.temperature_c,
+            };
+            match self.series.iter_mut().find(|s| s.gauge == what.of) {
+                Some(series) => series.samples.push(sample),
+                None => self.series.push(Series { gauge: what.of.clone(), samples: vec![sample] }),
+            }
         } else {
             self.readings.push(Reading {
                 of: what.of.clone(),
@@ -319,6 +334,7 @@ impl<'a> Placing<'a> {
             date: what.date,
             spot,
             instrument: what.instrument.clone(),
+            picture: what.picture.as_ref().and_then(|p| self.own.pictures.get(p)).cloned(),
             shows,
         });
     }

@@ -14,7 +14,7 @@ use crate::{
 };
 
 /// Most rows of a table.
-const MAX_ROWS: usize = 20_000;
+const MAX_ROWS: usize = 200_000;
 /// How many problems of a table are listed before the list is cut.
 const MAX_PROBLEMS: usize = 50;
 
@@ -27,6 +27,7 @@ enum Column {
     Height,
     Date,
     StdError,
+    Temperature,
     Gauge,
     Test,
     Value,
@@ -37,13 +38,14 @@ enum Column {
 }
 
 /// Names of columns. Those of what was measured end in their unit.
-const COLUMNS: [(&str, Column); 17] = [
+const COLUMNS: [(&str, Column); 18] = [
     ("along", Column::Along),
     ("face", Column::Face),
     ("angle_deg", Column::Angle),
     ("height_m", Column::Height),
     ("date", Column::Date),
     ("std_error", Column::StdError),
+    ("temperature_c", Column::Temperature),
     ("gauge", Column::Gauge),
     ("test", Column::Test),
     ("value", Column::Value),
@@ -190,6 +192,9 @@ pub(crate) struct RawReading {
     /// Where the gauge is, if the row says it.
     pub(crate) seat: Option<Seat>,
     pub(crate) test: Option<String>,
+    /// Of monitoring: when, and how warm the concrete was, °C.
+    pub(crate) date: Option<Date>,
+    pub(crate) temperature_c: Option<f64>,
     /// SI.
     pub(crate) value: f64,
     /// SI.
@@ -413,9 +418,9 @@ impl<'a> Table<'a> {
         let of_value = matches!(holds, Holds::One { column: Column::Value, .. });
         let is_stray = |column: &&Column| match column {
             Column::Depth => !profile && !gauges,
-            Column::Test => !gauges,
+            Column::Test | Column::Temperature => !gauges,
             Column::Value => !gauges && !of_value,
-            Column::Height | Column::Date => gauges,
+            Column::Height => gauges,
             _ => false,
         };
         let in_need = |column: &&Column| {
@@ -436,16 +441,15 @@ impl<'a> Table<'a> {
 
     /// What is said of the table beside its file and does not fit what it holds.
     fn unfit(&self, holds: Holds) -> Option<String> {
-        let Survey { along, face, angle_deg, height_m, date, kind, unit, test, electrode, .. } =
+        let Survey { along, face, angle_deg, height_m, kind, unit, test, electrode, .. } =
             self.survey;
         let gauges = matches!(holds, Holds::Gauges { .. });
         let of_value = matches!(holds, Holds::One { column: Column::Value, .. });
         // The side of all gauges may be said once, where each row says how far along it is.
         let has_side = (face.is_some() || angle_deg.is_some()) && !self.has(Column::Along);
-        if gauges && (along.is_some() || has_side || height_m.is_some() || date.is_some()) {
+        if gauges && (along.is_some() || has_side || height_m.is_some()) {
             let message = "gauges have their place in columns of the table or where they are \
-                           defined, and readings no date: leave along, face, angle_deg, height_m \
-                           and date out";
+                           defined: leave along, face, angle_deg and height_m out";
             return Some(message.into());
         }
         // What the column itself says may be said again.
@@ -545,6 +549,7 @@ impl<'a> Table<'a> {
             angle_deg: if own_side { angle } else { survey.angle_deg },
             height_m: row.optional(Column::Height)?.map(|h| h as f32).or(survey.height_m),
             instrument: survey.instrument.clone(),
+            picture: None,
             shows,
         };
         Ok(Placed { place: row.place(), is_row: true, what })
@@ -590,7 +595,14 @@ impl<'a> Table<'a> {
         let test = row.text(Column::Test).map(str::to_owned).or(self.survey.test.clone());
         let member = self.survey.member.clone();
         let (of, seat) = (of.to_owned(), self.seat(row)?);
-        let what = RawReading { member, of, seat, test, value, std_error, unit };
+        let (date, temperature_c) =
+            (row.date()?.or(self.survey.date), row.optional(Column::Temperature)?);
+        if let Some(celsius) = temperature_c.filter(|c| !(-60.0..=90.0).contains(c)) {
+            let message = format!("{celsius} °C is outside -60 to 90: is it Fahrenheit or kelvin?");
+            return Err(row.wrong(Column::Temperature, "RANGE", message));
+        }
+        let what =
+            RawReading { member, of, seat, test, date, temperature_c, value, std_error, unit };
         Ok(Placed { place: row.place(), is_row: true, what })
     }
 
@@ -728,7 +740,9 @@ impl Row<'_> {
 
     fn date(&self) -> Result<Option<Date>, Problem> {
         let Some(cell) = self.text(Column::Date) else { return Ok(None) };
-        cell.parse()
+        // The hour says nothing here.
+        let day = cell.split(['T', ' ']).next().unwrap_or(cell);
+        day.parse()
             .map(Some)
             .map_err(|why| self.wrong(Column::Date, "DATE", format!("\"{}\" {why}", shorten(cell))))
     }
