@@ -375,6 +375,76 @@ fn slices_of_a_core_are_attached_together() {
     assert!(!place.path("bridge/evidence").exists() && place.attached().is_empty());
 }
 
+/// Bare voxels get the header that they lack; a volume without --stack is no slice.
+#[test]
+fn volumes_are_attached_and_taken_away() {
+    let place = Place::new();
+    let voxels: Vec<u8> = (0..32 * 24 * 20_u16).flat_map(|i| (100 + i % 7).to_be_bytes()).collect();
+    let raw = place.brings("core.raw", [vec![0; 10], voxels].concat());
+    let how = ["--raw", "32,24,20", "--voxel-mm", "2,2,4", "--skip-bytes", "10", "--big-endian"];
+    let place_of = ["--along", "0.3", "--axis", "through", "--date", "2026-05-03"];
+    let told = place.done("attach", &[&["C1", &raw], &how[..], &place_of].concat());
+    assert_eq!([&told["name"], &told["added"][0]["value"]], ["core 1", "volume"]);
+    assert_eq!(told["added"][0]["date"], "2026-05-03");
+    let written = "Stack(name: \"core 1\", images: [\"evidence/C1_core_1/core.mha\"], along: 0.3, axis: Through, date: \"2026-05-03\")";
+    assert!(place.evidence().contains(written), "{}", place.evidence());
+    let copy = fs::read(place.path("bridge/evidence/C1_core_1/core.mha")).unwrap();
+    let head = String::from_utf8_lossy(&copy[..240]).into_owned();
+    assert!(head.contains("ElementSpacing = 2 2 4\nDimSize = 32 24 20\n"), "{head}");
+    assert!(head.contains("MSB = True") && copy.ends_with(&[0, 100 + (32 * 24 * 20 - 1) as u8 % 7]));
+    // The copy is a volume as any other.
+    let mha = text(&place.path("bridge/evidence/C1_core_1/core.mha")).to_owned();
+    place.refuses("attach", &["C1", &mha, "--along", "0.3"], 65, &["20 slices", "--stack"]);
+    place.done("attach", &["B1", &mha, "--stack", "--along", "0.3"]);
+    // What does not fit together.
+    let shorter = ["C1", &raw, "--raw", "32,24,19", "--voxel-mm", "2,2,4"];
+    place.refuses("attach", &shorter, 65, &["core.raw", "30730 bytes", "29184", "--skip-bytes"]);
+    place.refuses("attach", &["C1", &raw, "--raw", "32,24,20"], 65, &["--voxel-mm"]);
+    place.refuses("attach", &["C1", &raw, "--raw", "32,24"], 2, &["three numbers"]);
+    place.refuses("attach", &["C1", &mha, "--voxel-mm", "2,2,4"], 2, &["--stack"]);
+    let tiny = ["C1", &mha, "--stack", "--voxel-mm", "0.01,0.01,0.01"];
+    place.refuses("attach", &tiny, 65, &["hardly a grain"]);
+    for member in ["C1", "B1"] {
+        place.done("detach", &[member, "core 1"]);
+    }
+    assert!(!place.path("bridge/evidence").exists() && place.attached().is_empty());
+}
+
+/// Rows with a date and no load test are what a gauge has read over the years.
+#[test]
+fn gauges_are_read_over_the_years() {
+    let place = Place::new();
+    let rows: String = (1..=9)
+        .map(|month| format!("2025-{month:02}-15 08:00;SG1;{month};{}\n", 2 * month))
+        .collect();
+    let csv = place.brings("since.csv", format!("date;gauge;value;temperature_c\n{rows}"));
+    let told = place.done("attach", &["C1", &csv, "--unit", "ue"]);
+    let added = &told["added"][0];
+    assert_eq!([&added["name"], &added["kind"], &added["value"]], ["SG1", "monitoring", "9 readings"]);
+    let hot = place.brings("hot.csv", "date,gauge,value,temperature_c\n2025-01-02,SG1,3,280\n");
+    place.refuses("attach", &["C1", &hot, "--unit", "ue"], 65, &["hot.csv:2", "kelvin"]);
+    let no_gauge = place.brings("t.csv", "mV,temperature_c\n-300,4\n");
+    place.refuses("attach", &["C1", &no_gauge], 65, &["temperature_c", "take it out"]);
+    place.done("detach", &["C1", "since"]);
+    assert!(place.attached().is_empty());
+}
+
+/// A finding's photograph is copied with it, and goes with it.
+#[test]
+fn findings_have_pictures() {
+    let place = Place::new();
+    let picture = place.slice("crack.png");
+    let crack = ["C1", "--crack", "0.3", "--course", "along", "--along", "0.2"];
+    place.done("attach", &[&crack[..], &["--picture", &picture]].concat());
+    assert!(place.evidence().contains("picture: \"evidence/C1_crack_1/crack.png\""));
+    let text = place.brings("note.txt", "no picture");
+    place.refuses("attach", &[&crack[..], &["--picture", &text]].concat(), 65, &["JPEG"]);
+    let broken = place.brings("broken.jpg", "no picture");
+    place.refuses("attach", &[&crack[..], &["--picture", &broken]].concat(), 65, &["no picture"]);
+    place.done("detach", &["C1", "crack 1"]);
+    assert!(!place.path("bridge/evidence").exists());
+}
+
 #[test]
 fn what_lies_in_the_way_is_left_alone() {
     let place = Place::with_evidence();

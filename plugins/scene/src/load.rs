@@ -290,10 +290,17 @@ impl Scene {
         };
         match bundled().iter().find(|(n, _)| !scene.is_file() && Path::new(n) == name) {
             Some((name, _)) => Self::load_bundled(name, job),
+            // A project is known by its folder.
+            None if scene.join(PROJECT).is_file() => {
+                Self::load_within(&scene.join(PROJECT), access, job)
+            }
             None => Self::load_within(scene, access, job).map_err(|error| error.or_bundled(&name)),
         }
     }
 }
+
+/// The scene of a project's folder.
+pub(crate) const PROJECT: &str = "scene.ron";
 
 /// Everything that is wrong with a scene or a glTF file, errors and warnings. Empty: all is well.
 ///

@@ -49,6 +49,7 @@ pub fn listed(scene: &Scene) -> Vec<Listed> {
         .chain(slices.filter_map(|(member, slices)| of_slices(member, slices)))
         .chain(scene.structure.tests.iter().map(of_test))
         .chain(readings(scene))
+        .chain(series(scene))
         .collect();
     let place = |id: &str| scene.members.iter().position(|m| m.id == id);
     all.sort_by_cached_key(|one| place(&one.member));
@@ -107,6 +108,24 @@ fn of_test(test: &Test) -> Listed {
         value: weights.collect::<Vec<_>>().join(" + "),
         instrument: None,
     }
+}
+
+fn series(scene: &Scene) -> impl Iterator<Item = Listed> {
+    let structure = &scene.structure;
+    structure.series.iter().filter_map(|series| {
+        let gauge = structure.gauges.iter().find(|g| g.name == series.gauge)?;
+        Some(Listed {
+            member: gauge.member.clone(),
+            name: gauge.name.clone(),
+            kind: "monitoring",
+            date: series.samples.last().map(|s| s.date),
+            along: Some([gauge.along; 2]),
+            angle_deg: Some(gauge.angle_deg),
+            height_m: None,
+            value: format!("{} readings", series.samples.len()),
+            instrument: None,
+        })
+    })
 }
 
 fn readings(scene: &Scene) -> impl Iterator<Item = Listed> {

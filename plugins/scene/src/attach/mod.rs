@@ -36,6 +36,7 @@ use crate::{
         evidence::{self, EvidenceFile, MemberSlices, Record, Survey, no_member},
         extension, is_image, listing, matches, nearest, shorten,
     },
+    load::PROJECT,
     structure::{Action, Date, Electrode, Test},
 };
 
@@ -260,7 +261,7 @@ impl Project {
     /// There is no scene, or what lies beside it is no evidence.
     pub fn open(path: &Path, access: &Access) -> Result<Self, AttachError> {
         let is_scene = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("ron"));
-        let scene = if is_scene { path.to_owned() } else { path.join("scene.ron") };
+        let scene = if is_scene { path.to_owned() } else { path.join(PROJECT) };
         if !scene.is_file() {
             let line = format!(
                 "{}: there is no scene here: name a folder that holds scene.ron, or a scene file (`intrados import` and `intrados new` make one)",

@@ -507,7 +507,7 @@ mod tests {
         assert_eq!(parse("e.ron", &skeleton("bridge.ifc", "P/1")).unwrap(), empty);
         let file = parse("e.ron", &examples()).unwrap();
         assert_eq!(check(&file), []);
-        assert_eq!([file.items.len(), file.tables.len(), file.slices.len()], [5, 2, 1]);
+        assert_eq!([file.items.len(), file.tables.len(), file.slices.len()], [5, 3, 2]);
         assert_eq!([file.tests.len(), file.gauges.len(), file.readings.len()], [1, 1, 1]);
     }
 }
