@@ -769,7 +769,7 @@ fn suspicious(scene: &mut Scene) {
     }
 }
 
-fn camera(k: &super::Camera) -> crate::Camera {
+pub(super) fn camera(k: &super::Camera) -> crate::Camera {
     crate::Camera {
         name: k.name.clone(),
         position: k.position,
@@ -779,6 +779,7 @@ fn camera(k: &super::Camera) -> crate::Camera {
         width: k.width,
         height: k.height,
         exposure: k.exposure,
+        lens: k.lens,
     }
 }
 
