@@ -4,10 +4,7 @@ use std::collections::HashMap;
 
 use glam::DVec3;
 
-use crate::{
-    face::{Chart, Surface},
-    site::normal,
-};
+use crate::face::{Chart, Surface, normal};
 
 /// Cosine between normals on two sides of an edge: sharper than 30°.
 const SHARP: f64 = 0.866;

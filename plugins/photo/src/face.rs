@@ -10,8 +10,6 @@ use intrados_scene::{
 };
 use intrados_stage::{Cancelled, Job};
 
-use crate::site::normal;
-
 /// The concrete surface of a member.
 #[derive(Debug)]
 pub struct Surface {
@@ -265,4 +263,10 @@ impl Surface {
         }
         if whole > 0.0 { (sum / whole).max(1e-3) } else { 0.5 * self.far() }
     }
+}
+
+/// Unit normal of a triangle, outward.
+pub(crate) fn normal([a, b, c]: &[Vec3; 3]) -> DVec3 {
+    let [a, b, c] = [a, b, c].map(|p| p.as_dvec3());
+    (b - a).cross(c - a).normalize_or_zero()
 }

@@ -8,6 +8,7 @@ pub mod overlay;
 pub mod picks;
 pub mod picture;
 pub mod pose;
+pub mod record;
 pub mod series;
 pub mod similarity;
 pub mod site;

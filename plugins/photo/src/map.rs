@@ -9,13 +9,11 @@ use rayon::prelude::*;
 use crate::{
     Photograph, Pose,
     face::{Face, Spot, Surface},
-    site::Site,
+    site::{FLATTEST, Site},
 };
 
 /// Most pixels of a map.
 pub const MOST_PIXELS: u64 = 1 << 25;
-/// Sine of the flattest view that shows anything: 10°.
-pub const FLATTEST: f64 = 0.173_648;
 /// Most pixels of a photograph across one of a map that are averaged: of finer ones, every so many.
 const MOST_AVERAGED: f64 = 16.0;
 
@@ -91,7 +89,8 @@ pub fn unrolled(
     job: &Job,
 ) -> Result<FaceMap, MapError> {
     let m = 1e-3 * mm_px;
-    let pixels = |[from, to]: [f64; 2]| ((to - from) / m).ceil().max(1.0);
+    // A face of 200 pixels and rounding has 200.
+    let pixels = |[from, to]: [f64; 2]| ((to - from) / m - 1e-3).ceil().max(1.0);
     let [columns, rows] = [pixels(face.across), pixels(face.along)];
     if !(columns * rows <= MOST_PIXELS as f64) {
         let megapixels = 1e-6 * columns * rows;

@@ -1,6 +1,8 @@
 //! The scene as photographs look at it: what a ray meets, of which member, and what of it is seen
 //! from where.
 
+use std::collections::BTreeMap;
+
 use glam::{DVec3, Vec3};
 use intrados_scene::{
     Hit, Part, Ray, Scene, Tracer,
@@ -8,11 +10,19 @@ use intrados_scene::{
 };
 use intrados_stage::{Cancelled, Job};
 
-use crate::{Located, Pick, Pose, face::Surface, pose::Covariance};
+use crate::{
+    Located, Pick, Pose,
+    face::{Face, Surface, normal},
+    pose::{Covariance, UNKNOWNS},
+};
 
 /// A pick counts as seen while nothing lies between it and the camera up to this share of the
 /// distance: models and picks are no more exact.
 const NEAR: f64 = 0.01;
+/// Points of the grid along the picture's longer side, by which faces are looked for.
+const GRID: f64 = 128.0;
+/// Sine of the flattest view that shows anything: 10°.
+pub const FLATTEST: f64 = 0.173_648;
 
 /// Surfaces of a scene, and those of its members apart.
 #[derive(Debug)]
@@ -51,6 +61,17 @@ pub struct Sight {
     pub cosine: f64,
     /// mm on the surface that a pixel covers around the axis, and along it.
     pub mm_px: [f64; 2],
+}
+
+/// A face of a member that a camera sees.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SeenFace {
+    /// Index of the member.
+    pub member: usize,
+    /// The part of the face within which all lies that is seen of it.
+    pub face: Face,
+    /// About the middle of what is seen.
+    pub middle: Sight,
 }
 
 /// By how much what a pixel shows may be wrong because the pose is.
@@ -170,6 +191,51 @@ impl Site {
         })
     }
 
+    /// Faces that a camera sees less flatly than 10°, each as large as what is seen of it: looked
+    /// for on a grid of the picture.
+    #[must_use]
+    pub fn seen_faces(&self, pose: &Pose) -> Vec<SeenFace> {
+        let [width, height] = pose.size.map(f64::from);
+        let cell = width.max(height) / GRID;
+        let [columns, rows] = [width, height].map(|side| (side / cell).ceil() as u32);
+        let middle = |k: u32| (f64::from(k) + 0.5) * cell;
+        let pixels: Vec<[f64; 2]> =
+            (0..rows).flat_map(|y| (0..columns).map(move |x| [middle(x), middle(y)])).collect();
+        let mut seen: BTreeMap<(usize, usize), Vec<Sight>> = BTreeMap::new();
+        for sight in self.sights(pose, &pixels).into_iter().flatten() {
+            if let Some(face) = sight.face.filter(|_| sight.cosine >= FLATTEST) {
+                seen.entry((sight.member, face)).or_default().push(sight);
+            }
+        }
+        seen.into_iter().filter_map(|(of, sights)| self.seen_face(of, &sights, cell)).collect()
+    }
+
+    fn seen_face(
+        &self,
+        (member, index): (usize, usize),
+        sights: &[Sight],
+        cell: f64,
+    ) -> Option<SeenFace> {
+        let surface = self.surface(member)?;
+        let mut face = surface.faces.get(index)?.clone();
+        let mut window = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
+        for sight in sights {
+            let at = surface.on_face(&face, sight.place);
+            for (k, [low, high]) in window.iter_mut().enumerate() {
+                // What lies between the grid's points.
+                let margin = 1.5e-3 * cell * sight.mm_px[k];
+                (*low, *high) = (low.min(at[k] - margin), high.max(at[k] + margin));
+            }
+        }
+        for (whole, [low, high]) in [&mut face.across, &mut face.along].into_iter().zip(window) {
+            *whole = [whole[0].max(low), whole[1].min(high)];
+        }
+        let mean = sights.iter().map(|s| s.place).sum::<DVec3>() / sights.len() as f64;
+        let far = |sight: &&Sight| sight.place.distance_squared(mean);
+        let middle = sights.iter().min_by(|a, b| far(a).total_cmp(&far(b)))?;
+        Some(SeenFace { member, face, middle: *middle })
+    }
+
     /// By how much a sight may be wrong: the covariance of the pose carried to the picture, and
     /// from there to the surface. `None` where the surface is seen edge-on.
     #[must_use]
@@ -189,12 +255,6 @@ impl Site {
     }
 }
 
-/// Unit normal of a triangle, outward.
-pub(crate) fn normal([a, b, c]: &[Vec3; 3]) -> DVec3 {
-    let [a, b, c] = [a, b, c].map(|p| p.as_dvec3());
-    (b - a).cross(c - a).normalize_or_zero()
-}
-
 /// Standard error of the logarithm of pixels a metre along a tangent, by differences.
 fn scale_error(pose: &Pose, covariance: &Covariance, place: DVec3, tangent: DVec3) -> Option<f64> {
     let log_px_m = |pose: &Pose| {
@@ -202,8 +262,8 @@ fn scale_error(pose: &Pose, covariance: &Covariance, place: DVec3, tangent: DVec
         Some(slopes[0].dot(tangent).hypot(slopes[1].dot(tangent)).ln())
     };
     let distance = pose.position.distance(place);
-    let mut gradient = nalgebra::SVector::<f64, { crate::pose::UNKNOWNS }>::zeros();
-    for k in 0..crate::pose::UNKNOWNS {
+    let mut gradient = nalgebra::SVector::<f64, UNKNOWNS>::zeros();
+    for k in 0..UNKNOWNS {
         // k1 is kept in single precision.
         let step = match k {
             3..=5 => 1e-5 * distance,
@@ -211,7 +271,7 @@ fn scale_error(pose: &Pose, covariance: &Covariance, place: DVec3, tangent: DVec
             _ => 1e-5,
         };
         let [to, from] = [step, -step].map(|h| {
-            let mut by = [0.0; crate::pose::UNKNOWNS];
+            let mut by = [0.0; UNKNOWNS];
             by[k] = h;
             log_px_m(&pose.moved(&by))
         });
