@@ -111,7 +111,8 @@ fn homography(points: &[([f64; 2], [f64; 2])]) -> Option<Matrix3<f64>> {
     let eigen = (rows.transpose() * rows).symmetric_eigen();
     let mut order: Vec<usize> = (0..9).collect();
     order.sort_by(|a, b| eigen.eigenvalues[*a].total_cmp(&eigen.eigenvalues[*b]));
-    if !(eigen.eigenvalues[order[1]] > 1e-9 * eigen.eigenvalues[order[8]]) {
+    let stands_apart = eigen.eigenvalues[order[1]] > 1e-9 * eigen.eigenvalues[order[8]];
+    if !stands_apart {
         return None;
     }
     let h = eigen.eigenvectors.column(order[0]);

@@ -1,7 +1,7 @@
 //! Faces of members, and where on them a place lies: flat ones as they are, round members and
 //! linings unrolled.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 use glam::{DVec3, Vec3};
 use intrados_scene::{
@@ -37,6 +37,25 @@ pub struct Face {
     pub along: [f64; 2],
     /// How it is flattened.
     pub chart: Chart,
+}
+
+impl Face {
+    /// Half of the way around, m; `None` of flat ones.
+    pub(crate) fn half_turn(&self) -> Option<f64> {
+        match self.chart {
+            Chart::Flat(_) => None,
+            Chart::Around(radius) | Chart::Inside(radius) => Some(PI * radius),
+        }
+    }
+
+    /// A place across on this part of the face: of what goes around, as many turns further as bring
+    /// it nearest to the part's middle.
+    #[must_use]
+    pub fn turned(&self, across: f64) -> f64 {
+        let Some(half) = self.half_turn() else { return across };
+        let low = 0.5 * (self.across[0] + self.across[1]) - half;
+        low + (across - low).rem_euclid(2.0 * half)
+    }
 }
 
 /// How a face is flattened.

@@ -92,7 +92,8 @@ pub fn unrolled(
     // A face of 200 pixels and rounding has 200.
     let pixels = |[from, to]: [f64; 2]| ((to - from) / m - 1e-3).ceil().max(1.0);
     let [columns, rows] = [pixels(face.across), pixels(face.along)];
-    if !(columns * rows <= MOST_PIXELS as f64) {
+    let fits = columns * rows <= MOST_PIXELS as f64;
+    if !fits {
         let megapixels = 1e-6 * columns * rows;
         return Err(MapError::Large { face: face.name.clone(), megapixels, mm_px });
     }

@@ -70,7 +70,7 @@ impl Series {
     /// # Errors
     /// [`SeriesError`]: file, line and remedy.
     pub fn read(folder: &Path) -> Result<Self, SeriesError> {
-        let cameras = lines(&folder.join("cameras.txt"), |text| cameras(text))?;
+        let cameras = lines(&folder.join("cameras.txt"), cameras)?;
         let poses = lines(&folder.join("images.txt"), |text| images(text, &cameras))?;
         Ok(Self { poses })
     }

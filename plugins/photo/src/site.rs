@@ -218,9 +218,18 @@ impl Site {
     ) -> Option<SeenFace> {
         let surface = self.surface(member)?;
         let mut face = surface.faces.get(index)?.clone();
+        let mean = sights.iter().map(|s| s.place).sum::<DVec3>() / sights.len() as f64;
+        let far = |sight: &&Sight| sight.place.distance_squared(mean);
+        let middle = sights.iter().min_by(|a, b| far(a).total_cmp(&far(b)))?;
+        // What goes around is cut on the far side of what is seen.
+        let seam = surface.on_face(&face, middle.place)[0];
+        if let Some(half) = face.half_turn() {
+            face.across = [seam - half, seam + half];
+        }
         let mut window = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
         for sight in sights {
-            let at = surface.on_face(&face, sight.place);
+            let [across, along] = surface.on_face(&face, sight.place);
+            let at = [face.turned(across), along];
             for (k, [low, high]) in window.iter_mut().enumerate() {
                 // What lies between the grid's points.
                 let margin = 1.5e-3 * cell * sight.mm_px[k];
@@ -230,9 +239,6 @@ impl Site {
         for (whole, [low, high]) in [&mut face.across, &mut face.along].into_iter().zip(window) {
             *whole = [whole[0].max(low), whole[1].min(high)];
         }
-        let mean = sights.iter().map(|s| s.place).sum::<DVec3>() / sights.len() as f64;
-        let far = |sight: &&Sight| sight.place.distance_squared(mean);
-        let middle = sights.iter().min_by(|a, b| far(a).total_cmp(&far(b)))?;
         Some(SeenFace { member, face, middle: *middle })
     }
 

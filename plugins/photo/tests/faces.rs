@@ -64,6 +64,21 @@ fn a_lining_is_seen_from_inside() {
     assert!(!seen.is_empty() && seen.iter().all(|seen| seen.face.name == "Inside"), "{seen:?}");
 }
 
+/// Of a round column at most half is seen, in one piece, wherever the angle begins.
+#[test]
+fn half_of_a_round_column_is_seen_in_one_piece() {
+    let (scene, site) = column();
+    let c3 = scene.members.iter().position(|m| m.id == "C3").unwrap();
+    for (x, z) in [(-1.9, 1.0), (0.8, -1.7), (-0.5, -0.3), (-1.0, -2.6)] {
+        let pose = Pose::of(&camera(Vec3::new(x, 1.5, z), Vec3::new(-1.9, 1.5, -1.7)));
+        let seen = site.seen_faces(&pose);
+        let seen = seen.iter().find(|seen| seen.member == c3).unwrap();
+        let [from, to] = seen.face.across;
+        let around = std::f64::consts::TAU * 0.225;
+        assert!((0.3..0.56).contains(&((to - from) / around)), "{:?}", seen.face);
+    }
+}
+
 /// Places on both sides of a seam, right and left as one sees them: what is further to the right in
 /// the picture is further across, on each face.
 #[test]

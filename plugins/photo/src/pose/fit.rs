@@ -115,8 +115,8 @@ pub(super) fn fit(start: Pose, picks: &[Pick], prior: &Prior, loss: Loss) -> Opt
 fn inverse(matrix: Covariance) -> Option<Covariance> {
     let scale: [f64; UNKNOWNS] = std::array::from_fn(|k| matrix[(k, k)].sqrt());
     let even = Covariance::from_fn(|i, j| matrix[(i, j)] / (scale[i] * scale[j]));
-    let spread = even.symmetric_eigenvalues();
-    if !(spread.min() > 1e-13) {
+    let is_closed = even.symmetric_eigenvalues().min() > 1e-13;
+    if !is_closed {
         return None;
     }
     let inverse = even.cholesky()?.inverse();
