@@ -891,6 +891,10 @@ pub(crate) struct Photo {
     /// Of the maps, mm a pixel
     #[arg(long, value_name = "MM", default_value_t = 1.0, value_parser = mm_per_px)]
     pub(crate) mm_per_px: f64,
+    /// Folder with cameras.txt and images.txt of COLMAP: photographs that are in it stand where it
+    /// says, in the frame of three or more places that are picked in two of them
+    #[arg(long, value_name = "DIR", requires = "pose")]
+    pub(crate) series: Option<PathBuf>,
     /// Focal length, pixels; what EXIF says if absent
     #[arg(long, value_name = "PX", value_parser = focal_px)]
     pub(crate) focal_px: Option<f64>,

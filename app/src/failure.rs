@@ -3,7 +3,7 @@
 use intrados_ct::SliceError;
 use intrados_damage::predict::PredictError;
 use intrados_experiments::ExperimentError;
-use intrados_photo::{map::MapError, picks::PicksError};
+use intrados_photo::{map::MapError, picks::PicksError, series::SeriesError};
 use intrados_report::RecordError;
 use intrados_scene::{ErrorKind, LoadError, attach::AttachError, gltf::ImportError, import};
 use intrados_stage::file::WriteError;
@@ -166,6 +166,15 @@ impl From<PicksError> for Failure {
         match &error {
             PicksError::Denied { path, source } => Self::denied(path, source),
             PicksError::Bad { .. } => Self::BadInput(error.to_string()),
+        }
+    }
+}
+
+impl From<SeriesError> for Failure {
+    fn from(error: SeriesError) -> Self {
+        match &error {
+            SeriesError::Denied { path, source } => Self::denied(path, source),
+            _ => Self::BadInput(error.to_string()),
         }
     }
 }

@@ -4,11 +4,12 @@ use std::{collections::BTreeSet, path::Path};
 
 use glam::DVec3;
 use intrados_photo::{
-    FaceMap, Located, Photograph, Pick, Prior, Site, locate,
+    FaceMap, Located, Photograph, Pick, PoseError, Prior, Site, locate,
     overlay::Overlay,
     picks::{self, PickedIn},
     picture::srgb,
     record::{FaceRecord, PoseRecord},
+    series::{PlacedSeries, Series},
     taken::{Focal, Taken},
     unrolled,
 };
@@ -81,6 +82,8 @@ struct Work<'a> {
     scene: Scene,
     site: Site,
     picks: Vec<PickedIn>,
+    /// Of COLMAP, where there is one.
+    series: Option<PlacedSeries>,
     /// Index of the one member that is unrolled.
     member: Option<usize>,
 }
@@ -96,7 +99,11 @@ pub(crate) fn run(session: &Session, args: &args::Photo) -> Result<Outcome, Fail
         None => Vec::new(),
     };
     let member = args.member.as_ref().map(|word| index_of(&scene, word)).transpose()?;
-    let work = Work { session, args, scene, site, picks, member };
+    let series = match &args.series {
+        Some(folder) => Some(Series::read(folder)?.placed(&picks)?),
+        None => None,
+    };
+    let work = Work { session, args, scene, site, picks, series, member };
     let names: Vec<String> = args.files.iter().map(|file| name(file)).collect();
     if let Some(twice) = names.iter().enumerate().find(|(i, n)| names[..*i].contains(n)) {
         let line = format!("two photographs are called {}: give one another name", twice.1);
@@ -255,8 +262,17 @@ impl Work<'_> {
     fn locate(
         &self,
         photograph: &Photograph,
+        name: &str,
         picks: &[Pick],
-    ) -> Result<Located, intrados_photo::PoseError> {
+    ) -> Result<Located, PoseError> {
+        let in_series = self.series.as_ref().and_then(|series| series.located(name, picks));
+        match in_series {
+            Some(located) if located.pose.size == photograph.size => return Ok(located),
+            Some(_) => tracing::warn!(
+                "{name}: COLMAP saw it in another size, or before it was turned upright: its own picks place it"
+            ),
+            None => {}
+        }
         let known = self.args.focal_px.map(|px| Focal { px, rel_error: 0.0 });
         let prior = Prior {
             size: photograph.size,

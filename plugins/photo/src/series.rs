@@ -10,7 +10,7 @@ use intrados_scene::Lens;
 use intrados_stage::access::{self, Denied};
 use nalgebra::{Matrix3, Vector3};
 
-use crate::{Pick, Pose, picks::PickedIn, similarity::Similarity};
+use crate::{Located, Pick, Pose, picks::PickedIn, pose::Covariance, similarity::Similarity};
 
 /// Longest of COLMAP's files, bytes.
 const LONGEST: u64 = 1 << 28;
@@ -57,10 +57,15 @@ pub struct Series {
 pub struct PlacedSeries {
     /// By the name of the photograph's file.
     pub poses: BTreeMap<String, Pose>,
-    /// From COLMAP's frame to the scene's.
-    pub similarity: Similarity,
     /// Root mean square of what the places are off, m.
     pub rms_m: f64,
+    /// Middle of the places, m, and Σ (|d|² − d dᵀ), Σ |d|² of what they are from it, m².
+    middle: DVec3,
+    inertia: Matrix3<f64>,
+    spread: f64,
+    /// Variance of each coordinate of a place, m², and how many places there are.
+    variance: f64,
+    count: usize,
 }
 
 impl Series {
@@ -94,15 +99,65 @@ impl Series {
         let met = |(place, rays): &(DVec3, Vec<(&Pose, &Pick)>)| Some([meet(rays)?, *place]);
         let pairs: Vec<[DVec3; 2]> = by_place.iter().filter_map(met).collect();
         let similarity = Similarity::between(&pairs).ok_or(SeriesError::TooFew(pairs.len()))?;
-        let off = |[p, q]: &[DVec3; 2]| similarity.apply(*p).distance_squared(*q);
-        let rms_m = (pairs.iter().map(off).sum::<f64>() / pairs.len() as f64).sqrt();
         let turned = |pose: &Pose| {
             let rotation = pose.rotation * similarity.rotation.transpose();
             let position = similarity.apply(pose.position);
             Pose::new(position, rotation, pose.focal_px, pose.lens, pose.size)
         };
         let poses = self.poses.iter().map(|(name, pose)| (name.clone(), turned(pose))).collect();
-        Ok(PlacedSeries { poses, similarity, rms_m })
+        let count = pairs.len();
+        let middle = pairs.iter().map(|[_, q]| *q).sum::<DVec3>() / count as f64;
+        let (mut inertia, mut spread, mut off) = (Matrix3::zeros(), 0.0, 0.0);
+        for [p, q] in &pairs {
+            let d = Vector3::from((*q - middle).to_array());
+            inertia += Matrix3::identity() * d.norm_squared() - d * d.transpose();
+            spread += d.norm_squared();
+            off += similarity.apply(*p).distance_squared(*q);
+        }
+        // Three coordinates of each place, less the seven that the similarity takes.
+        let variance = off / (3.0 * count as f64 - 7.0).max(1.0);
+        let rms_m = (off / count as f64).sqrt();
+        Ok(PlacedSeries { poses, rms_m, middle, inertia, spread, variance, count })
+    }
+}
+
+impl PlacedSeries {
+    /// Where a photograph of the series stood, with the error of the frame: what the places are off
+    /// leaves its shift, its turn θ and its scale s open, and moves a camera at d from the places'
+    /// middle by δt + θ × d + δs d. Within the series COLMAP's errors are far smaller, and left
+    /// out. `None` of a photograph that is not in it.
+    #[must_use]
+    pub fn located(&self, photo: &str, picks: &[Pick]) -> Option<Located> {
+        let pose = *self.poses.get(photo)?;
+        let d = Vector3::from((pose.position - self.middle).to_array());
+        let turn = self.inertia.try_inverse()? * self.variance;
+        // θ × d = −[d]× θ; a turn of the world by θ turns the camera's axes by −R θ.
+        let shift = -d.cross_matrix();
+        let axes = -Matrix3::from_column_slice(&pose.rotation.to_cols_array());
+        let place = shift * turn * shift.transpose()
+            + Matrix3::identity() * (self.variance / self.count as f64)
+            + d * d.transpose() * (self.variance / self.spread);
+        let mut covariance = Covariance::zeros();
+        covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(&(axes * turn * axes.transpose()));
+        covariance.fixed_view_mut::<3, 3>(0, 3).copy_from(&(axes * turn * shift.transpose()));
+        covariance.fixed_view_mut::<3, 3>(3, 0).copy_from(&(shift * turn * axes.transpose()));
+        covariance.fixed_view_mut::<3, 3>(3, 3).copy_from(&place);
+        let off = |pick: &Pick| {
+            let at = pose.project(pick.place);
+            at.map_or([f64::NAN; 2], |[x, y]| [x - pick.pixel[0], y - pick.pixel[1]])
+        };
+        let residuals: Vec<[f64; 2]> = picks.iter().map(off).collect();
+        let squares: f64 = residuals.iter().map(|[x, y]| x * x + y * y).sum();
+        let rms_px = if picks.is_empty() { 0.0 } else { (squares / picks.len() as f64).sqrt() };
+        Some(Located {
+            pose,
+            covariance,
+            residuals,
+            rms_px,
+            reduced_chi2: 1.0,
+            left_out: None,
+            other: None,
+        })
     }
 }
 
@@ -247,64 +302,108 @@ fn images(text: &str, cameras: &HashMap<String, Optics>) -> Result<BTreeMap<Stri
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::fmt::Write;
+    use intrados_stage::random::Key;
 
-    /// Three planted cameras written as COLMAP would in a frame of its own, turned, scaled and
-    /// shifted: reading and matching brings them back.
-    #[test]
-    fn a_series_comes_back_into_the_scenes_frame() {
+    /// Three cameras that look at the origin from 4 m.
+    fn planted() -> [Pose; 3] {
         let lens = Lens { k1: -0.05, k2: 0.01, p1: 0.001, p2: -0.002, centre: [0.01, -0.005] };
-        let at = |x: f64, y: f64| {
+        [[0.0, 0.0], [1.5, 0.5], [-1.0, -0.7]].map(|[x, y]| {
             let forward = -DVec3::new(x, y, 4.0).normalize();
             let right = forward.cross(DVec3::Y).normalize();
             let rotation = DMat3::from_cols(right, forward.cross(right), forward).transpose();
             Pose::new(DVec3::new(x, y, 4.0), rotation, 1800.0, lens, [2000, 1500])
-        };
-        let planted = [at(0.0, 0.0), at(1.5, 0.5), at(-1.0, -0.7)];
-        let frame = Similarity {
+        })
+    }
+
+    fn frame() -> Similarity {
+        Similarity {
             scale: 0.3,
             rotation: DMat3::from_axis_angle(DVec3::new(1.0, 2.0, -1.0).normalize(), 0.8),
             shift: DVec3::new(3.0, -1.0, 2.0),
+        }
+    }
+
+    fn name(i: usize) -> String {
+        format!("wall {i}.jpg")
+    }
+
+    const PLACES: [[f64; 3]; 6] = [
+        [0.3, 0.1, 0.0],
+        [-0.4, 0.2, 0.1],
+        [0.1, -0.5, -0.2],
+        [0.0, 0.4, 0.3],
+        [-0.5, -0.4, -0.3],
+        [0.5, 0.5, -0.1],
+    ];
+
+    /// Places as the planted cameras draw them, each wrong by so many metres in each direction.
+    fn picks(wrong_m: f64, seed: u64) -> Vec<PickedIn> {
+        let noise = |k: u64| wrong_m * Key::new(seed, k).normal(0);
+        let of = |(k, place): (u64, &[f64; 3])| {
+            let seen = DVec3::from_array(*place);
+            let off = DVec3::new(noise(3 * k), noise(3 * k + 1), noise(3 * k + 2));
+            planted().into_iter().enumerate().map(move |(i, pose)| {
+                let pixel = pose.project(seen).unwrap();
+                PickedIn { photo: Some(name(i)), pick: Pick { pixel, place: seen + off } }
+            })
         };
-        let [cx, cy] = [1000.0 + 0.01 * 2000.0, 750.0 - 0.005 * 2000.0];
+        (0..).zip(&PLACES).flat_map(of).collect()
+    }
+
+    /// Cameras written as COLMAP would in a frame of its own, turned, scaled and shifted: reading
+    /// and matching brings them back.
+    #[test]
+    fn a_series_comes_back_into_the_scenes_frame() {
+        let (cx, cy, mut images_text) = (1020, 740, String::from("# images\n"));
         let cameras_text =
             format!("# cameras\n1 OPENCV 2000 1500 1800 1800 {cx} {cy} -0.05 0.01 0.001 -0.002\n");
-        let mut images_text = String::from("# images\n");
-        for (i, pose) in planted.iter().enumerate() {
-            let rotation = pose.rotation * frame.rotation.transpose();
-            let t = -(rotation * frame.apply(pose.position));
-            let q = DQuat::from_mat3(&rotation);
-            writeln!(
-                images_text,
-                "{i} {} {} {} {} {} {} {} 1 wall {i}.jpg\n1 2 3",
-                q.w, q.x, q.y, q.z, t.x, t.y, t.z
-            )
-            .unwrap();
+        for (i, pose) in planted().into_iter().enumerate() {
+            let rotation = pose.rotation * frame().rotation.transpose();
+            let t = -(rotation * frame().apply(pose.position));
+            let [x, y, z, w] = DQuat::from_mat3(&rotation).to_array();
+            let line = format!("{i} {w} {x} {y} {z} {} {} {} 1 {}", t.x, t.y, t.z, name(i));
+            images_text += &format!("{line}\n1 2 3\n");
         }
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("cameras.txt"), cameras_text).unwrap();
         std::fs::write(folder.path().join("images.txt"), images_text).unwrap();
         let series = Series::read(folder.path()).unwrap();
-        let places = [[0.3, 0.1, 0.0], [-0.4, 0.2, 0.1], [0.1, -0.5, -0.2], [0.0, 0.4, 0.3]];
-        let picks: Vec<PickedIn> = places
-            .iter()
-            .flat_map(|place| {
-                let place = DVec3::from_array(*place);
-                (0..3).map(move |i| (i, place))
-            })
-            .map(|(i, place)| {
-                let pixel = planted[i].project(place).unwrap();
-                PickedIn { photo: Some(format!("wall {i}.jpg")), pick: Pick { pixel, place } }
-            })
-            .collect();
-        let placed = series.placed(&picks).unwrap();
+        let placed = series.placed(&picks(0.0, 0)).unwrap();
         assert!(placed.rms_m < 1e-5, "{}", placed.rms_m);
-        for (i, pose) in planted.iter().enumerate() {
-            let found = &placed.poses[&format!("wall {i}.jpg")];
+        for (i, pose) in planted().into_iter().enumerate() {
+            let found = &placed.poses[&name(i)];
             assert!(found.position.distance(pose.position) < 1e-4);
             assert!(found.rotation.abs_diff_eq(pose.rotation, 1e-5));
         }
-        assert!(matches!(series.placed(&picks[..6]), Err(SeriesError::TooFew(2))));
+        let two = &picks(0.0, 0)[..6];
+        assert!(matches!(series.placed(two), Err(SeriesError::TooFew(2))));
+    }
+
+    /// Places of the model that are wrong by 5 mm: the cameras' errors scatter as stated, by the
+    /// mean of their χ² with six degrees of freedom (F: 6 · 11/9 for eleven of the residuals).
+    #[test]
+    fn a_series_is_as_wrong_as_it_says() {
+        let poses = planted().into_iter().enumerate().map(|(i, pose)| (name(i), pose)).collect();
+        let series = Series { poses };
+        let (mut sum, mut count) = (0.0, 0.0);
+        for seed in 0..300 {
+            let placed = series.placed(&picks(0.005, 1 + seed)).unwrap();
+            for (i, planted) in planted().into_iter().enumerate() {
+                let found = placed.located(&name(i), &[]).unwrap();
+                let turn = found.pose.rotation * planted.rotation.transpose();
+                let turn = DQuat::from_mat3(&turn).to_scaled_axis();
+                let shift = found.pose.position - planted.position;
+                let off = nalgebra::Vector6::from_column_slice(
+                    &[turn.to_array(), shift.to_array()].concat(),
+                );
+                let known = found.covariance.fixed_view::<6, 6>(0, 0).into_owned();
+                sum += (off.transpose() * known.try_inverse().unwrap() * off)[0];
+                count += 1.0;
+            }
+        }
+        let (mean, expected) = (sum / count, 6.0 * 11.0 / 9.0);
+        assert!((mean / expected - 1.0).abs() < 0.15, "{mean} {expected}");
+        assert!(series.placed(&picks(0.0, 0)).unwrap().located("other.jpg", &[]).is_none());
     }
 
     #[test]

@@ -1,21 +1,17 @@
 //! What a lens does to a picture: Brown's distortion.
+//!
+//! It is the gradient of a potential, so its Jacobian is symmetric, with eigenvalues of at least
+//! min(1 + k1 r² + k2 r⁴, 1 + 3 k1 r² + 5 k2 r⁴) − 6 r |(p1, p2)|. Up to the radius where that
+//! bound falls to [`Lens::STEEPEST`] the potential is convex: no two points are drawn at one place,
+//! and Newton's method finds the one that was. Beyond it the lens shows nothing.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Distortion of a lens (D. C. Brown, "Decentering distortion of lenses", 1966), as OpenCV and
-/// COLMAP write it: a point that a pinhole would draw at (x, y), tangents to the right and
-/// downwards from the optical axis, is drawn at
-///
-/// ```text
-/// x (1 + k1 r² + k2 r⁴) + 2 p1 x y + p2 (r² + 2 x²)
-/// y (1 + k1 r² + k2 r⁴) + p1 (r² + 2 y²) + 2 p2 x y
-/// ```
-///
-/// This is the gradient of a potential, so its Jacobian is symmetric, with eigenvalues of at least
-/// min(1 + k1 r² + k2 r⁴, 1 + 3 k1 r² + 5 k2 r⁴) − 6 r |(p1, p2)|. Up to the radius where that
-/// bound falls to [`Lens::STEEPEST`] the potential is convex: no two points are drawn at one place,
-/// and Newton's method finds the one that was. Beyond it the lens shows nothing.
+/// COLMAP write it: with x and y to the right and downwards from the optical axis, tangents, and r²
+/// = x² + y², what a pinhole would draw at (x, y) is drawn at x (1 + k1 r² + k2 r⁴) + 2 p1 x y + p2
+/// (r² + 2 x²) and y (1 + k1 r² + k2 r⁴) + p1 (r² + 2 y²) + 2 p2 x y.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Lens {
