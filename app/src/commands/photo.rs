@@ -131,13 +131,15 @@ pub(crate) fn run(session: &Session, args: &args::Photo) -> Result<Outcome, Fail
             Ok(placed) => report.photos.push(placed),
             Err(failure @ (Failure::BadInput(_) | Failure::NoInput(_))) => {
                 let because = one_line(&failure.to_string());
-                tracing::warn!("not used: {because}");
                 report.unused.push(Unused { file: file.display().to_string(), because });
                 first.get_or_insert(failure);
             }
             Err(failure) => return Err(failure),
         }
     }
+    // Where none is used the first reason is the command's own.
+    let told = usize::from(report.photos.is_empty());
+    report.unused.iter().skip(told).for_each(|u| tracing::warn!("not used: {}", u.because));
     if let (true, Some(failure)) = (report.photos.is_empty(), first) {
         return Err(failure);
     }
@@ -206,8 +208,9 @@ impl Work<'_> {
             tracing::info!("{name}: {note}");
         }
         let picks = self.picks_in(name);
-        let located =
-            self.locate(&photograph, &picks).map_err(|error| Failure::BadInput(bad(&error)))?;
+        let located = self
+            .locate(&photograph, name, &picks)
+            .map_err(|error| Failure::BadInput(bad(&error)))?;
         if located.other.is_some() {
             tracing::warn!(
                 "{name}: another place of the camera fits nearly as well: pick a point out of the plane of the others"

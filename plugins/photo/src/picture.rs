@@ -62,6 +62,8 @@ pub struct Photograph {
     /// What a user should know: that it says nothing, or that its colours are no sRGB.
     pub notes: Vec<String>,
     samples: Samples,
+    /// Linear light of every value of a sample.
+    linear: Vec<f32>,
 }
 
 /// Red, green and blue by rows from the top, as the file has them.
@@ -124,7 +126,12 @@ impl Photograph {
                 ));
             }
         };
-        Ok(Self { size, taken, notes, samples })
+        let most = match samples {
+            Samples::Eight(_) => u16::from(u8::MAX),
+            Samples::Sixteen(_) => u16::MAX,
+        };
+        let linear = (0..=most).map(|value| linear(f32::from(value) / f32::from(most))).collect();
+        Ok(Self { size, taken, notes, samples, linear })
     }
 
     /// Linear light of the pixel in column `x` and row `y`, red, green and blue, 1 where it is
@@ -137,10 +144,10 @@ impl Photograph {
         }
         let first = 3 * (y as usize * width as usize + x as usize);
         let value = |k: usize| match &self.samples {
-            Samples::Eight(all) => f32::from(all[first + k]) / 255.0,
-            Samples::Sixteen(all) => f32::from(all[first + k]) / 65_535.0,
+            Samples::Eight(all) => usize::from(all[first + k]),
+            Samples::Sixteen(all) => usize::from(all[first + k]),
         };
-        Some(Vec3::from_array([0, 1, 2].map(|k| linear(value(k)))))
+        Some(Vec3::from_array([0, 1, 2].map(|k| self.linear[value(k)])))
     }
 
     /// Linear light at a place, pixels from the top left (the first pixel's middle is at ½, ½),
