@@ -4,7 +4,7 @@
 
 use glam::{DVec3, Vec3};
 use intrados_photo::{
-    Located, Pick, Pose, Prior, Site, face::Chart, locate, taken::Focal, unrolled,
+    Located, Pick, Pose, Prior, Site, face::Chart, locate, picks, taken::Focal, unrolled,
 };
 use intrados_scene::{Camera, Lens, Scene};
 use intrados_stage::{Job, random::Key};
@@ -186,6 +186,39 @@ fn places_and_millimetres_are_as_wrong_as_they_say() {
     for square in squares {
         let mean = square / count;
         assert!((0.5..1.3).contains(&mean), "{squares:?} of {count}");
+    }
+}
+
+/// Tables of picks: corners by member and number, places by coordinates; what is wrong is refused
+/// with its line.
+#[test]
+fn picks_are_read_and_bad_ones_refused_with_their_line() {
+    let (scene, site) = column();
+    let folder = tempfile::tempdir().unwrap();
+    let table = folder.path().join("picks.csv");
+    let read = |text: &str| {
+        std::fs::write(&table, text).unwrap();
+        picks::read(&table, &scene, &site).map_err(|error| error.to_string())
+    };
+    let good = "photo,u,v,x,y,z,member,corner\na.jpg, 10.5,20,,,,C2,1\nb.jpg,3,4,1,2,-3,,\n";
+    let good = read(good).unwrap();
+    assert!(good[0].pick.place.distance(DVec3::new(1.9, 0.0, 1.5)) < 1e-6);
+    assert_eq!(good[0].pick.pixel, [10.5, 20.0]);
+    assert_eq!(good[1].pick.place, DVec3::new(1.0, 2.0, -3.0));
+    assert_eq!(good[1].photo.as_deref(), Some("b.jpg"));
+    assert_eq!(read("\u{feff}u,v,x,y,z\n1,2,3,4,5\n").unwrap().len(), 1);
+    for (text, place, word) in [
+        ("u,v,member,corner\n1,2,C2,1\n1,2,C9,1\n", ":3: ", "intrados info"),
+        ("u,v,member,corner\n1,2,C2,9\n", ":2: ", "--corners C2"),
+        ("u,v,member,corner\n1,2,C2,0\n", ":2: ", "8"),
+        ("u,v,x,y,z\n1,2,3,4,inf\n", ":2: ", "no number"),
+        ("u,v,x,y,z\n1,,3,4,5\n", ":2: ", "v is missing"),
+        ("u,v,x,y,z,member,corner\n1,2,3,4,5,C2,1\n", ":2: ", "either"),
+        ("u,v,depth\n1,2,3\n", ":1: ", "columns"),
+        ("u,v,x,y,z\n1,2,3\n", ":2: ", "table"),
+    ] {
+        let error = read(text).unwrap_err();
+        assert!(error.contains(place) && error.contains(word), "{error}");
     }
 }
 

@@ -170,3 +170,42 @@ fn a_giant_is_refused_by_its_header() {
     let error = Photograph::open(&path).unwrap_err().to_string();
     assert!(error.contains("30000") && error.contains("120 megapixels"), "{error}");
 }
+
+/// Some thousand damaged files of each kind: read or refused, never a panic.
+#[test]
+fn damaged_files_never_panic() {
+    use intrados_stage::random::Key;
+    let folder = tempfile::tempdir().unwrap();
+    let picture = DynamicImage::from(picture());
+    let files = [
+        ("a.jpg", jpeg_with(&exif(6, 28))),
+        ("a.png", bytes(&picture, ImageFormat::Png)),
+        ("a.tif", bytes(&DynamicImage::from(picture.to_rgb16()), ImageFormat::Tiff)),
+    ];
+    let mut read = 0;
+    for (seed, (name, good)) in (0..).zip(&files) {
+        for k in 0..1500_u64 {
+            let key = Key::new(40 + seed, k);
+            let mut bad = good.clone();
+            for i in 0..1 + key.bits(0) % 4 {
+                // Headers more often than pixels.
+                let share = key.unit(3 * i + 1).powi(3);
+                let at = (share * bad.len() as f32) as usize;
+                bad[at] = key.bits(3 * i + 2) as u8;
+            }
+            if key.bits(99) % 5 == 0 {
+                bad.truncate((key.unit(98) * bad.len() as f32) as usize);
+            }
+            let path = write(&folder, name, &bad);
+            match Photograph::open(&path) {
+                Ok(photograph) => {
+                    read += 1;
+                    let [width, height] = photograph.size;
+                    assert!(photograph.light(width - 1, height - 1).is_some());
+                }
+                Err(error) => assert!(!error.to_string().is_empty()),
+            }
+        }
+    }
+    assert!(read > 100, "{read}");
+}

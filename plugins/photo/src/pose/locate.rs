@@ -3,6 +3,7 @@
 use glam::DVec3;
 use intrados_scene::Lens;
 use nalgebra::{DMatrix, SMatrix};
+use rayon::prelude::*;
 
 use super::{
     Covariance, Pick, Pose,
@@ -59,6 +60,9 @@ pub enum PoseError {
         /// With what is known.
         why: &'static str,
     },
+    /// Too many.
+    #[error("{0} picks are more than the {MOST} that are read: leave out some")]
+    TooMany(usize),
     /// A number that cannot be.
     #[error("pick {0}: {1}")]
     Pick(usize, &'static str),
@@ -98,6 +102,8 @@ const WORST: f64 = 9.0;
 const RIVAL: f64 = 9.0;
 /// Largest error of the place, as a share of the distance.
 const OPEN: f64 = 0.2;
+/// Most picks: nobody picks more by hand, and one wrong among them is looked for one by one.
+const MOST: usize = 100;
 /// How many starts are followed downhill.
 const FOLLOWED: usize = 16;
 /// Farthest place, m, as in scenes.
@@ -112,7 +118,7 @@ const FAR: f64 = 1e5;
 pub fn locate(
     picks: &[Pick],
     prior: &Prior,
-    admits: &dyn Fn(&Pose) -> bool,
+    admits: &(dyn Fn(&Pose) -> bool + Sync),
 ) -> Result<Located, PoseError> {
     check(picks, prior)?;
     let all = best(picks, prior, admits);
@@ -124,6 +130,7 @@ pub fn locate(
         picks.iter().enumerate().filter(|(i, _)| *i != k).map(|(_, pick)| *pick).collect()
     };
     let mut tried: Vec<(usize, Found)> = (0..picks.len())
+        .into_par_iter()
         .filter(|&k| check(&without(k), prior).is_ok())
         .filter_map(|k| Some((k, best(&without(k), prior, admits).ok()?)))
         .collect();
@@ -152,7 +159,11 @@ fn freedom(picks: &[Pick], prior: &Prior) -> f64 {
 }
 
 /// The best pose, and its rival if there is one.
-fn best(picks: &[Pick], prior: &Prior, admits: &dyn Fn(&Pose) -> bool) -> Result<Found, PoseError> {
+fn best(
+    picks: &[Pick],
+    prior: &Prior,
+    admits: &(dyn Fn(&Pose) -> bool + Sync),
+) -> Result<Found, PoseError> {
     let robust = Loss::Robust(10.0 * prior.picking_px);
     let mut begun: Vec<(f64, Pose)> = focals(prior)
         .into_iter()
@@ -263,6 +274,9 @@ fn check(picks: &[Pick], prior: &Prior) -> Result<(), PoseError> {
     };
     if picks.len() < needed {
         return Err(PoseError::TooFew { got: picks.len(), needed, why });
+    }
+    if picks.len() > MOST {
+        return Err(PoseError::TooMany(picks.len()));
     }
     let [width, height] = prior.size.map(f64::from);
     for (i, pick) in picks.iter().enumerate() {

@@ -233,6 +233,8 @@ fn picks_that_say_too_little_are_refused() {
     assert!(matches!(refused(&outside, KNOWN), PoseError::Pick(3, _)));
     outside[2] = Pick { place: DVec3::new(0.0, f64::INFINITY, 0.0), ..picks[2] };
     assert!(matches!(refused(&outside, KNOWN), PoseError::Pick(3, _)));
+    let many = vec![picks[0]; 101];
+    assert_eq!(refused(&many, KNOWN), PoseError::TooMany(101));
     let nowhere = locate(&picks, &prior(KNOWN), &|_| false).unwrap_err();
     assert_eq!(nowhere, PoseError::Hidden);
 }
