@@ -10,7 +10,7 @@ pub mod picture;
 pub mod pose;
 pub mod record;
 pub mod series;
-pub mod similarity;
+mod similarity;
 pub mod site;
 pub mod taken;
 

@@ -13,7 +13,7 @@ use crate::{
 };
 
 /// Most pixels of a map.
-pub const MOST_PIXELS: u64 = 1 << 25;
+const MOST_PIXELS: u64 = 1 << 25;
 /// Most pixels of a photograph across one of a map that are averaged: of finer ones, every so many.
 const MOST_AVERAGED: f64 = 16.0;
 

@@ -13,7 +13,7 @@ use intrados_stage::access::{self, Denied};
 use crate::taken::Taken;
 
 /// Most pixels of a photograph: 720 MB with sixteen bits a colour.
-pub const MOST_PIXELS: u64 = 120_000_000;
+const MOST_PIXELS: u64 = 120_000_000;
 /// Longest file, bytes.
 const LONGEST: u64 = 1 << 30;
 /// Fewest pixels across or down.

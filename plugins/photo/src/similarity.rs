@@ -5,21 +5,20 @@ use nalgebra::Matrix3;
 
 /// q = scale · rotation · p + shift.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Similarity {
+pub(crate) struct Similarity {
     /// How much longer lengths become.
-    pub scale: f64,
+    pub(crate) scale: f64,
     /// A proper rotation.
-    pub rotation: DMat3,
+    pub(crate) rotation: DMat3,
     /// In the units of q.
-    pub shift: DVec3,
+    pub(crate) shift: DVec3,
 }
 
 impl Similarity {
     /// The one that brings points p nearest to points q, by the sum of squares (S. Umeyama,
     /// "Least-squares estimation of transformation parameters between two point patterns", 1991).
     /// `None` of less than three pairs, and where either lie at one place or on a line.
-    #[must_use]
-    pub fn between(pairs: &[[DVec3; 2]]) -> Option<Self> {
+    pub(crate) fn between(pairs: &[[DVec3; 2]]) -> Option<Self> {
         if pairs.len() < 3 {
             return None;
         }
@@ -46,8 +45,7 @@ impl Similarity {
     }
 
     /// Where a point goes.
-    #[must_use]
-    pub fn apply(&self, p: DVec3) -> DVec3 {
+    pub(crate) fn apply(&self, p: DVec3) -> DVec3 {
         self.scale * (self.rotation * p) + self.shift
     }
 }

@@ -22,7 +22,7 @@ const NEAR: f64 = 0.01;
 /// Points of the grid along the picture's longer side, by which faces are looked for.
 const GRID: f64 = 128.0;
 /// Sine of the flattest view that shows anything: 10°.
-pub const FLATTEST: f64 = 0.173_648;
+pub(crate) const FLATTEST: f64 = 0.173_648;
 
 /// Surfaces of a scene, and those of its members apart.
 #[derive(Debug)]

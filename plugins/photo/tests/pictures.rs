@@ -193,7 +193,7 @@ fn damaged_files_never_panic() {
                 let at = (share * bad.len() as f32) as usize;
                 bad[at] = key.bits(3 * i + 2) as u8;
             }
-            if key.bits(99) % 5 == 0 {
+            if key.bits(99).is_multiple_of(5) {
                 bad.truncate((key.unit(98) * bad.len() as f32) as usize);
             }
             let path = write(&folder, name, &bad);

@@ -171,8 +171,7 @@ impl Pose {
     }
 
     /// The pose a step further in what is unknown of it.
-    #[must_use]
-    pub fn moved(&self, step: &[f64; UNKNOWNS]) -> Self {
+    pub(crate) fn moved(&self, step: &[f64; UNKNOWNS]) -> Self {
         let turn = DMat3::from_quat(glam::DQuat::from_scaled_axis(DVec3::from_slice(&step[..3])));
         let lens = Lens { k1: (f64::from(self.lens.k1) + step[7]) as f32, ..self.lens };
         let position = self.position + DVec3::from_slice(&step[3..6]);
