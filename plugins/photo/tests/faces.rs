@@ -4,7 +4,7 @@
 
 use glam::{DVec3, Vec3};
 use intrados_photo::{
-    Located, Pick, Pose, Prior, Site, face::Chart, locate, picks, taken::Focal, unrolled,
+    Located, Pick, Pose, PoseError, Prior, Site, face::Chart, locate, picks, taken::Focal, unrolled,
 };
 use intrados_scene::{Camera, Lens, Scene};
 use intrados_stage::{Job, random::Key};
@@ -234,6 +234,27 @@ fn picks_that_are_seen_through_concrete_are_refused() {
         site.admits(&Pose::of(&camera(position, Vec3::new(1.7, 1.5, 1.3))), &picks)
     });
     assert!(before && !behind);
+}
+
+/// Left and right of one face exchanged: that is what somebody would see who stood behind it.
+#[test]
+fn an_exchanged_face_is_seen_from_behind_and_refused() {
+    let (_, site) = column();
+    let position = Vec3::new(3.7, 1.65, 5.4);
+    let pose = Pose::of(&camera(position, Vec3::new(1.0, 1.4, 0.0)));
+    let focal = Some(Focal { px: pose.focal_px, rel_error: 0.03 });
+    let prior = Prior { size: pose.size, focal, lens: pose.lens, k1_error: 0.0, picking_px: 1.0 };
+    let found = |exchanged: bool| {
+        let pick = |[x, y]: [f64; 2]| {
+            let seen = if exchanged { 3.4 - x } else { x };
+            let pixel = pose.project(DVec3::new(seen, y, 1.5)).unwrap();
+            Pick { pixel, place: DVec3::new(x, y, 1.5) }
+        };
+        let picks = [[1.5, 0.5], [1.9, 0.5], [1.9, 2.5], [1.5, 2.5]].map(pick);
+        locate(&picks, &prior, &|pose| site.admits(pose, &picks))
+    };
+    assert!(found(false).unwrap().pose.position.distance(pose.position) < 1e-3);
+    assert_eq!(found(true).unwrap_err(), PoseError::Hidden);
 }
 
 /// A photograph whose colour at each pixel is its place on the front of C2, as far as eight bits
