@@ -255,6 +255,13 @@ fn an_exchanged_face_is_seen_from_behind_and_refused() {
     };
     assert!(found(false).unwrap().pose.position.distance(pose.position) < 1e-3);
     assert_eq!(found(true).unwrap_err(), PoseError::Hidden);
+    // What fits nowhere says by how much, admitted or not.
+    let any = [[10.0, 20.0], [800.0, 700.0], [30.0, 600.0], [1100.0, 60.0], [500.0, 420.0]];
+    let places = [[1.5, 0.5], [1.9, 0.5], [1.9, 2.5], [1.5, 2.5], [1.7, 1.0]];
+    let pick = |(pixel, [x, y]): (_, [f64; 2])| Pick { pixel, place: DVec3::new(x, y, 1.5) };
+    let picks: Vec<Pick> = any.into_iter().zip(places).map(pick).collect();
+    let error = locate(&picks, &prior, &|_| false).unwrap_err().to_string();
+    assert!(error.contains("the best leaves"), "{error}");
 }
 
 /// A photograph whose colour at each pixel is its place on the front of C2, as far as eight bits

@@ -71,10 +71,11 @@ pub enum PoseError {
     Degenerate(&'static str),
     /// No camera sees them so.
     #[error(
-        "no camera sees the picks so: the best leaves {rms_px:.1} px where {picking_px} px of picking are expected: is this the photograph of that member, are left and right exchanged, or picks of two members mixed up?"
+        "no camera sees the picks so{}: is this the photograph of that member, are left and right exchanged, or picks of two members mixed up?",
+        left(*rms_px, *picking_px)
     )]
     NoFit {
-        /// Root mean square of the best, pixels.
+        /// Root mean square of the best, pixels; infinite where none has all of them before it.
         rms_px: f64,
         /// What was stated.
         picking_px: f64,
@@ -94,6 +95,14 @@ pub enum PoseError {
         /// From the picks' middle, m.
         distance_m: f64,
     },
+}
+
+fn left(rms_px: f64, picking_px: f64) -> String {
+    if rms_px.is_finite() {
+        format!(": the best leaves {rms_px:.1} px where {picking_px} px of picking are expected")
+    } else {
+        String::new()
+    }
 }
 
 /// Largest χ² over its degrees of freedom that is a fit: three standard errors of picking.
@@ -186,8 +195,9 @@ fn best(
     }
     found.sort_by(|a, b| a.chi2.total_cmp(&b.chi2));
     let any_fits = found.first().is_some_and(|fit| fits(fit, picks, prior));
+    let rms_px = found.first().and_then(|fit| rms(&fit.pose, picks)).unwrap_or(f64::INFINITY);
+    let nothing = PoseError::NoFit { rms_px, picking_px: prior.picking_px };
     found.retain(|fit| admits(&fit.pose));
-    let nothing = PoseError::NoFit { rms_px: f64::INFINITY, picking_px: prior.picking_px };
     match found.first().cloned() {
         Some(first) if fits(&first, picks, prior) || !any_fits => {
             let other = found.into_iter().skip(1).find(|fit| {
@@ -216,6 +226,12 @@ fn rough(pose: &Pose, picks: &[Pick], prior: &Prior) -> Option<f64> {
     Some(off.iter().map(|[x, y]| ((x * x + y * y) / scale).ln_1p()).sum())
 }
 
+/// Root mean square of the residuals, pixels.
+fn rms(pose: &Pose, picks: &[Pick]) -> Option<f64> {
+    let squares: f64 = residuals(pose, picks)?.iter().map(|[x, y]| x * x + y * y).sum();
+    Some((squares / picks.len() as f64).sqrt())
+}
+
 /// Whether two poses are the same, to a share of the distance.
 fn is_same(a: &Pose, b: &Pose, picks: &[Pick], share: f64) -> bool {
     let distance = a.position.distance(middle(picks));
@@ -233,12 +249,9 @@ fn told(
     left_out: Option<usize>,
     prior: &Prior,
 ) -> Result<Located, PoseError> {
-    let nothing = PoseError::NoFit { rms_px: f64::INFINITY, picking_px: prior.picking_px };
     let counts: Vec<Pick> =
         picks.iter().enumerate().filter(|(i, _)| Some(*i) != left_out).map(|(_, p)| *p).collect();
-    let squares: f64 =
-        residuals(&fit.pose, &counts).ok_or(nothing)?.iter().map(|[x, y]| x * x + y * y).sum();
-    let rms_px = (squares / counts.len() as f64).sqrt();
+    let rms_px = rms(&fit.pose, &counts).unwrap_or(f64::INFINITY);
     let reduced_chi2 = fit.chi2 / freedom(&counts, prior);
     if reduced_chi2 > WORST {
         return Err(PoseError::NoFit { rms_px, picking_px: prior.picking_px });
