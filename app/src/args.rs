@@ -146,6 +146,12 @@ pub(crate) enum Command {
         after_help = "Example:\n  intrados detect slices/*.tif --truth masks/*.tif --pixel-mm 0.05 --out found"
     )]
     Detect(Detect),
+    /// Finds where photographs were taken from, by corners picked in them, and unrolls the faces
+    /// that they show
+    #[command(
+        after_help = "Examples:\n  intrados photo column --corners C2\n  intrados photo column hall.jpg --pose picks.csv --mm-per-px 0.5 --out maps\n\nThe table of picks has the columns u, v (pixels of the upright photograph from its top left), and either x, y, z (m) or member, corner (as --corners numbers them); of several photographs photo, the file's name. Four picks are needed where the focal length is known (EXIF or --focal-px), else six; more are better, and points out of one plane.\nWritten are pose.json; of each photograph the model's edges drawn over it; of each face that it shows its light as PNG with a world file (m across and along), and where it is unknown in white: not seen, flatter than 10° or outside.\nPixels of a whole picture are assumed: one that was cut out needs --focal-px."
+    )]
+    Photo(Photo),
     /// Predicts the damage of every member, with a report
     #[command(after_help = "Example:\n  intrados predict scenes/column.ron --out report")]
     Predict(Predict),
@@ -929,6 +935,57 @@ pub(crate) enum Method {
     Network,
     /// A local threshold, and a ridge filter for cracks
     Classical,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Photo {
+    /// The scene that they show
+    pub(crate) scene: PathBuf,
+    /// Photographs: JPEG, PNG or TIFF
+    #[arg(value_name = "FILE", required_unless_present = "corners")]
+    pub(crate) files: Vec<PathBuf>,
+    /// Table of picks
+    #[arg(long, value_name = "PICKS.csv", required_unless_present = "corners")]
+    pub(crate) pose: Option<PathBuf>,
+    /// Print the numbered corners of this member, and nothing else
+    #[arg(long, value_name = "MEMBER", conflicts_with_all = ["files", "pose"])]
+    pub(crate) corners: Option<String>,
+    /// Unroll this member alone; all that are seen if absent
+    #[arg(long, value_name = "MEMBER")]
+    pub(crate) member: Option<String>,
+    /// Of the maps, mm a pixel
+    #[arg(long, value_name = "MM", default_value_t = 1.0, value_parser = mm_per_px)]
+    pub(crate) mm_per_px: f64,
+    /// Folder with cameras.txt and images.txt of COLMAP: photographs that are in it stand where it
+    /// says, in the frame of three or more places that are picked in two of them
+    #[arg(long, value_name = "DIR", requires = "pose")]
+    pub(crate) series: Option<PathBuf>,
+    /// Focal length, pixels; what EXIF says if absent
+    #[arg(long, value_name = "PX", value_parser = focal_px)]
+    pub(crate) focal_px: Option<f64>,
+    /// Standard error of a pick, pixels
+    #[arg(long, value_name = "PX", default_value_t = 2.0, value_parser = picking_px)]
+    pub(crate) picking_px: f64,
+    /// Folder for the files
+    #[arg(long, value_name = "DIR", default_value = "out")]
+    pub(crate) out: PathBuf,
+}
+
+fn between(text: &str, low: f64, high: f64, unit: &str) -> Result<f64, String> {
+    let value = text.parse().ok().filter(|x| (low..=high).contains(x));
+    value.ok_or_else(|| format!("give {low} to {high} {unit}"))
+}
+
+fn mm_per_px(text: &str) -> Result<f64, String> {
+    between(text, 0.01, 1000.0, "mm a pixel")
+}
+
+fn focal_px(text: &str) -> Result<f64, String> {
+    between(text, 10.0, 1e6, "pixels")
+}
+
+fn picking_px(text: &str) -> Result<f64, String> {
+    between(text, 0.01, 100.0, "pixels")
 }
 
 #[derive(Debug, Args)]

@@ -3,6 +3,7 @@
 use intrados_ct::SliceError;
 use intrados_damage::predict::PredictError;
 use intrados_experiments::ExperimentError;
+use intrados_photo::{map::MapError, picks::PicksError, series::SeriesError};
 use intrados_report::RecordError;
 use intrados_scene::{ErrorKind, LoadError, attach::AttachError, gltf::ImportError, import};
 use intrados_stage::file::WriteError;
@@ -156,6 +157,33 @@ impl From<SliceError> for Failure {
             SliceError::File(error) => error.into(),
             SliceError::Cancelled(_) => Self::Interrupted,
             _ => Self::BadInput(error.to_string()),
+        }
+    }
+}
+
+impl From<PicksError> for Failure {
+    fn from(error: PicksError) -> Self {
+        match &error {
+            PicksError::Denied { path, source } => Self::denied(path, source),
+            PicksError::Bad { .. } => Self::BadInput(error.to_string()),
+        }
+    }
+}
+
+impl From<SeriesError> for Failure {
+    fn from(error: SeriesError) -> Self {
+        match &error {
+            SeriesError::Denied { path, source } => Self::denied(path, source),
+            _ => Self::BadInput(error.to_string()),
+        }
+    }
+}
+
+impl From<MapError> for Failure {
+    fn from(error: MapError) -> Self {
+        match error {
+            MapError::Cancelled(_) => Self::Interrupted,
+            error => Self::BadInput(error.to_string()),
         }
     }
 }

@@ -26,6 +26,7 @@ fn all() -> String {
         "analyze",
         "scan",
         "detect",
+        "photo",
         "predict",
         "experiment",
         "verify",

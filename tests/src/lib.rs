@@ -169,6 +169,7 @@ pub fn camera(position: Vec3, target: Vec3, fov_deg: f32) -> Camera {
         width: 32,
         height: 32,
         exposure: 0.0,
+        lens: None,
     }
 }
 

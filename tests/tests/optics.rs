@@ -8,7 +8,7 @@ use std::{f64::consts::PI, sync::Arc};
 use glam::{Affine2, DVec3, Mat4, Vec2, Vec3};
 use intrados_light::{MeterReading, Sensor};
 use intrados_scene::{
-    Camera, LampKind, Material, Mesh, Meter, Scene, Surface, Texture, TextureRef, Wrap,
+    Camera, LampKind, Lens, Material, Mesh, Meter, Scene, Surface, Texture, TextureRef, Wrap,
 };
 use intrados_tests::{
     Family, Furnish, ball, camera, cuboid, lit, made_of, matt, meter, quad, read, sensors, shining,
@@ -436,15 +436,20 @@ fn picture_of_floor(eye: &Camera, radiance: impl Fn(f64, f64) -> f64) -> f64 {
 }
 
 /// Lit by a beam from above a matt floor shows ρ E/π: the texture at its place, the right way
-/// round, times the colours of its corners.
+/// round, times the colours of its corners; and through a lens, whose pixels are of other solid
+/// angles.
 #[test]
 fn textures_lie_where_they_should() {
-    let eye = camera(Vec3::new(0.6, 1.0, 0.8), Vec3::new(0.3, 0.0, 0.3), 50.0);
+    let plain = camera(Vec3::new(0.6, 1.0, 0.8), Vec3::new(0.3, 0.0, 0.3), 50.0);
+    let lens = Lens { k1: -0.35, k2: 0.1, p1: 0.01, p2: -0.02, centre: [0.05, -0.03] };
+    let bent = Camera { lens: Some(lens), fov_deg: 65.0, ..plain.clone() };
+    assert!(bent.is_covered());
     let mut family = Family::default();
-    for (name, transform, coloured) in [
-        ("plain", Affine2::IDENTITY, false),
-        ("turned", turned(), false),
-        ("coloured", Affine2::IDENTITY, true),
+    for (name, eye, transform, coloured) in [
+        ("plain", &plain, Affine2::IDENTITY, false),
+        ("turned", &plain, turned(), false),
+        ("coloured", &plain, Affine2::IDENTITY, true),
+        ("through a lens", &bent, Affine2::IDENTITY, true),
     ] {
         let mut scene = Scene::default();
         // u along +x, v along +z: a quad of 2 m whose first corner is (−1, 0, −1).
@@ -462,7 +467,7 @@ fn textures_lie_where_they_should() {
             irradiance: Vec3::splat(PI as f32),
         });
         scene.cameras.push(eye.clone());
-        let expected = picture_of_floor(&eye, |x, z| {
+        let expected = picture_of_floor(eye, |x, z| {
             if x.abs() > 1.0 || z.abs() > 1.0 {
                 return 0.0;
             }

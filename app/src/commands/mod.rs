@@ -10,6 +10,7 @@ mod info;
 mod measure;
 mod merge;
 mod new;
+mod photo;
 mod predict;
 mod render;
 mod scan;
@@ -43,6 +44,7 @@ pub(crate) fn run(cli: &Cli, session: &Session) -> Result<Outcome, Failure> {
         Some(Command::Analyze(args)) => analyze::run(session, args),
         Some(Command::Scan(args)) => scan::run(session, args),
         Some(Command::Detect(args)) => detect::run(session, args),
+        Some(Command::Photo(args)) => photo::run(session, args),
         Some(Command::Predict(args)) => predict::run(session, args),
         Some(Command::Experiment(args)) => experiment::run(session, args),
         Some(Command::Verify) => verify::run(session),

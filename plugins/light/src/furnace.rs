@@ -57,6 +57,7 @@ impl Furnace {
             width: 16,
             height: 16,
             exposure: 0.0,
+            lens: None,
         });
         let meter = |name: &str, corner, u, v| Meter { name: name.into(), corner, u, v, on: None };
         scene.meters = vec![

@@ -107,7 +107,7 @@ pub struct Radiosity {
 }
 
 impl Radiosity {
-    /// Solves for a camera on finer and finer meshes.
+    /// Solves for a camera on finer and finer meshes. What its lens distorts is left out.
     ///
     /// # Errors
     /// [`Cancelled`] if the job is.
@@ -326,6 +326,7 @@ mod tests {
             width: 32,
             height: 32,
             exposure: 0.0,
+            lens: None,
         }
     }
 

@@ -2,7 +2,7 @@
 //! and evaluated.
 
 use glam::Vec3;
-use intrados_scene::{Camera, Meter};
+use intrados_scene::{Camera, Lens, Meter};
 use serde::{Deserialize, Serialize};
 use wide::f32x8;
 
@@ -97,6 +97,52 @@ pub(crate) struct Pinhole {
     pub(crate) height: u32,
     /// 1/area of a pixel on the picture plane at unit distance.
     density: f32,
+    lens: Option<Distortion>,
+}
+
+/// A lens, its centre in tangents, and how far from its axis it draws.
+#[derive(Debug, Clone)]
+struct Distortion {
+    lens: Lens,
+    centre: [f64; 2],
+    reach: f64,
+}
+
+impl Distortion {
+    fn new(lens: Lens, half: [f32; 2]) -> Self {
+        let centre = lens.centre.map(|c| 2.0 * f64::from(half[0]) * f64::from(c));
+        Self { lens, centre, reach: lens.reach() }
+    }
+
+    /// The undistorted picture plane (tangents to the right and upwards) behind places on the drawn
+    /// one. What no pixel of a checked camera asks for, beyond the lens, stays where it is.
+    fn undone(&self, x: f32x8, y: f32x8) -> [f32x8; 2] {
+        let ([mut x, mut y], [cx, cy]) = ([x.to_array(), y.to_array()], self.centre);
+        for (x, y) in x.iter_mut().zip(&mut y) {
+            let drawn = [f64::from(*x) - cx, -f64::from(*y) - cy];
+            if let Some([right, down]) = self.lens.undistort(drawn, self.reach) {
+                (*x, *y) = (right as f32, -down as f32);
+            }
+        }
+        [x, y].map(f32x8::from)
+    }
+
+    /// Where points of the undistorted plane are drawn, by how much area is stretched there, and
+    /// which lanes the lens draws at all.
+    fn done(&self, x: f32x8, y: f32x8) -> ([f32x8; 2], f32x8, u32) {
+        let ([mut x, mut y], [cx, cy]) = ([x.to_array(), y.to_array()], self.centre);
+        let (mut stretch, mut drawn) = ([1.0; WIDE], 0);
+        for lane in 0..WIDE {
+            let seen = [f64::from(x[lane]), -f64::from(y[lane])];
+            if seen[0].hypot(seen[1]) <= self.reach {
+                let ([right, down], [a, b, c]) = self.lens.distort(seen);
+                (x[lane], y[lane]) = ((right + cx) as f32, -(down + cy) as f32);
+                stretch[lane] = (a * c - b * b) as f32;
+                drawn |= 1 << lane;
+            }
+        }
+        ([x, y].map(f32x8::from), f32x8::from(stretch), drawn)
+    }
 }
 
 impl Pinhole {
@@ -105,7 +151,8 @@ impl Pinhole {
         let half = camera.half_extent();
         let (width, height) = (camera.width, camera.height);
         let density = (width * height) as f32 / (4.0 * half[0] * half[1]);
-        Self { position: camera.position, right, up, forward, half, width, height, density }
+        let lens = camera.lens.map(|lens| Distortion::new(lens, half));
+        Self { position: camera.position, right, up, forward, half, width, height, density, lens }
     }
 
     /// Unit directions through `jitter` within pixels `bin`.
@@ -118,9 +165,10 @@ impl Pinhole {
         let y = f32x8::ONE
             - (f32x8::from(bin.map(|b| (b / self.width) as f32)) + jitter[1])
                 * c(2.0 / self.height as f32);
-        let right =
-            Vec3x8::splat(self.right).mul_add(x * c(self.half[0]), Vec3x8::splat(self.forward));
-        let way = Vec3x8::splat(self.up).mul_add(y * c(self.half[1]), right);
+        let [x, y] = [x * c(self.half[0]), y * c(self.half[1])];
+        let [x, y] = self.lens.as_ref().map_or([x, y], |lens| lens.undone(x, y));
+        let right = Vec3x8::splat(self.right).mul_add(x, Vec3x8::splat(self.forward));
+        let way = Vec3x8::splat(self.up).mul_add(y, right);
         way * (f32x8::ONE / way.dot(way).sqrt())
     }
 
@@ -130,14 +178,22 @@ impl Pinhole {
     }
 
     /// Which pixels see `to` (from the pinhole, any length), and W_e there per m² across the ray:
-    /// 1/(a cos³θ r²), with the pixel's area a. The mask names the lanes that are seen at all.
+    /// J/(a cos³θ r²), with the pixel's area a and the lens's stretch of areas J (1 without): an
+    /// undistorted area is dω/cos³θ, and a pixel is even over the drawn one. The mask names the
+    /// lanes that are seen at all.
     #[inline]
     pub(crate) fn see(&self, to: Vec3x8) -> (u32, [u32; WIDE], f32x8) {
         let c = f32x8::splat;
         let along = |axis: Vec3| to.dot(Vec3x8::splat(axis));
         let z = along(self.forward);
-        let (x, y) =
+        let (mut x, mut y) =
             (along(self.right) / (z * c(self.half[0])), along(self.up) / (z * c(self.half[1])));
+        let (mut density, mut drawn) = (c(self.density), u32::MAX);
+        if let Some(lens) = &self.lens {
+            let half = self.half.map(c);
+            let ([lens_x, lens_y], stretch, lanes) = lens.done(x * half[0], y * half[1]);
+            (x, y, density, drawn) = (lens_x / half[0], lens_y / half[1], density * stretch, lanes);
+        }
         let seen =
             z.simd_gt(f32x8::ZERO) & x.abs().simd_lt(f32x8::ONE) & y.abs().simd_lt(f32x8::ONE);
         let cell = |x: f32x8, n: u32| {
@@ -148,7 +204,7 @@ impl Pinhole {
             (row[i] as u32).wrapping_mul(self.width).wrapping_add(column[i] as u32)
         });
         // cosθ = z/r, so 1/(cos³θ r²) = r/z³
-        (seen.to_bitmask(), bin, c(self.density) * to.dot(to).sqrt() / (z * z * z))
+        (seen.to_bitmask() & drawn, bin, density * to.dot(to).sqrt() / (z * z * z))
     }
 
     /// [`Self::see`] of one place.
@@ -244,30 +300,46 @@ mod tests {
             width: 40,
             height: 30,
             exposure: 0.0,
+            lens: None,
         }
     }
 
+    fn distorted() -> Camera {
+        let lens = Lens { k1: -0.25, k2: 0.06, p1: 0.004, p2: -0.003, centre: [0.02, -0.01] };
+        Camera { fov_deg: 75.0, lens: Some(lens), ..camera() }
+    }
+
     /// What a pixel's ray hits, the pixel sees; and ∫ W_e cos dω over a pixel is 1 by quadrature
-    /// over the sphere.
+    /// over the sphere, whatever the lens.
     #[test]
     fn the_pinhole_sees_what_it_looks_at() {
-        let eye = Pinhole::new(&camera());
-        for i in 0..1000_u32 {
-            let bin = i % (40 * 30);
-            let key = Key::new(1, u64::from(i));
-            let d = eye.direction(bin, [0.01 + 0.98 * key.unit(0), 0.01 + 0.98 * key.unit(1)]);
-            assert_eq!(eye.sees(d * 7.0).map(|s| s.0), Some(bin));
+        for (camera, n) in [(camera(), 4_000_000_u64), (distorted(), 4_000_000)] {
+            assert!(camera.is_covered());
+            let eye = Pinhole::new(&camera);
+            for i in 0..1000_u32 {
+                let bin = i % (40 * 30);
+                let key = Key::new(1, u64::from(i));
+                let d = eye.direction(bin, [0.01 + 0.98 * key.unit(0), 0.01 + 0.98 * key.unit(1)]);
+                assert_eq!(eye.sees(d * 7.0).map(|s| s.0), Some(bin));
+            }
+            let (mut sum, mut corner) = (0.0, [0.0; 2]);
+            for i in 0..n {
+                let d = crate::bsdf::warp::sphere(Key::new(2, i).pair(0));
+                // seen at distance 1: W_e per m² across the ray is W_e per sr
+                let Some((bin, w)) = eye.sees(d) else { continue };
+                sum += f64::from(w);
+                // A block of 8 × 8 pixels in the corner, where the lens stretches most.
+                if bin % 40 < 8 && bin / 40 < 8 {
+                    corner[0] += f64::from(w);
+                    corner[1] += f64::from(w).powi(2);
+                }
+            }
+            let sphere = 4.0 * std::f64::consts::PI / n as f64;
+            // every one of the 1200 pixels integrates to 1; 5 standard errors of this sum are 1 %
+            assert!((sum * sphere / 1200.0 - 1.0).abs() < 0.01, "{sum}");
+            let z = (corner[0] * sphere - 64.0) / (corner[1].sqrt() * sphere);
+            assert!(z.abs() < 4.0, "{z}: {}", corner[0] * sphere);
         }
-        let n = 4_000_000_u64;
-        let mut sum = 0.0;
-        for i in 0..n {
-            let d = crate::bsdf::warp::sphere(Key::new(2, i).pair(0));
-            // seen at distance 1: W_e per m² across the ray is W_e per sr
-            sum += eye.sees(d).map_or(0.0, |(_, w)| f64::from(w));
-        }
-        let total = sum / n as f64 * 4.0 * std::f64::consts::PI;
-        // every one of the 1200 pixels integrates to 1; 5 standard errors of this sum are 1 %
-        assert!((total / 1200.0 - 1.0).abs() < 0.01, "{total}");
     }
 
     #[test]

@@ -67,6 +67,7 @@ mod tests {
             width: 400,
             height: 200,
             exposure: 0.0,
+            lens: None,
         }
     }
 

@@ -265,6 +265,7 @@ mod tests {
             width: 64,
             height: 64,
             exposure: 0.0,
+            lens: None,
         }
     }
 

@@ -1,8 +1,10 @@
 //! Sensors: everything with a response W_e over S = (A_x, Ω_x), eq. 2.4.
 
 use bevy_ecs::component::Component;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
+
+use crate::Lens;
 
 /// A pinhole camera with a box filter. A pixel's value is the mean radiance over it; the camera's
 /// reading is the mean luminance Y over its pixels, W·m⁻²·sr⁻¹.
@@ -25,6 +27,9 @@ pub struct Camera {
     /// Exposure for the tone-mapped picture, stops (EV); 0 leaves radiance 1 at display 1 before
     /// the curve.
     pub exposure: f32,
+    /// How its lens distorts; none: straight lines stay straight. The field of view is that of the
+    /// same camera without distortion.
+    pub lens: Option<Lens>,
 }
 
 impl Camera {
@@ -44,6 +49,7 @@ impl Camera {
             width: 960,
             height: 720,
             exposure: 0.0,
+            lens: None,
         }
         .framing(bounds)
     }
@@ -86,13 +92,71 @@ impl Camera {
         [x, x * self.height as f32 / self.width as f32]
     }
 
-    /// Unit direction through picture position `(x, y)` in pixels from the top left.
+    /// Where the picture plane at unit distance is met by the ray through picture position
+    /// `(x, y)`, in pixels from the top left: tangents to the right and downwards from the optical
+    /// axis. `None` where the lens draws nothing.
+    #[must_use]
+    pub fn tangents(&self, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
+        let [hx, hy] = self.half_extent().map(f64::from);
+        let (width, height) = (f64::from(self.width), f64::from(self.height));
+        let drawn = [(2.0 * x / width - 1.0) * hx, (2.0 * y / height - 1.0) * hy];
+        let Some(lens) = &self.lens else { return Some(drawn) };
+        let [cx, cy] = lens.centre.map(|c| 2.0 * hx * f64::from(c));
+        lens.undistort([drawn[0] - cx, drawn[1] - cy], lens.reach())
+    }
+
+    /// Unit direction through picture position `(x, y)` in pixels from the top left; along the
+    /// optical axis where the lens draws nothing ([`Camera::is_covered`] says whether that may be).
     #[must_use]
     pub fn direction(&self, x: f32, y: f32) -> Vec3 {
         let [right, up, forward] = self.frame();
-        let [hx, hy] = self.half_extent();
-        let (u, v) = (2.0 * x / self.width as f32 - 1.0, 1.0 - 2.0 * y / self.height as f32);
-        (forward + right * (u * hx) + up * (v * hy)).normalize()
+        if self.lens.is_none() {
+            let [hx, hy] = self.half_extent();
+            let (u, v) = (2.0 * x / self.width as f32 - 1.0, 1.0 - 2.0 * y / self.height as f32);
+            return (forward + right * (u * hx) + up * (v * hy)).normalize();
+        }
+        let [a, b] = self.tangents([x, y].map(f64::from)).unwrap_or_default().map(|t| t as f32);
+        (forward + right * a - up * b).normalize()
+    }
+
+    /// Where a point of the world is drawn, in pixels from the top left, be that within the picture
+    /// or not. `None` of what is behind the camera or beyond what its lens draws.
+    #[must_use]
+    pub fn project(&self, point: DVec3) -> Option<[f64; 2]> {
+        let [right, up, forward] = self.frame().map(|axis| axis.as_dvec3());
+        let to = point - self.position.as_dvec3();
+        let depth = to.dot(forward);
+        let seen = [to.dot(right) / depth, -to.dot(up) / depth];
+        let [hx, hy] = self.half_extent().map(f64::from);
+        if !(depth > 0.0 && seen.iter().all(|t| t.is_finite())) {
+            return None;
+        }
+        let [x, y] = match &self.lens {
+            None => seen,
+            Some(lens) if seen[0].hypot(seen[1]) > lens.reach() => return None,
+            Some(lens) => {
+                let ([x, y], _) = lens.distort(seen);
+                let [cx, cy] = lens.centre.map(|c| 2.0 * hx * f64::from(c));
+                [x + cx, y + cy]
+            }
+        };
+        Some([
+            0.5 * (x / hx + 1.0) * f64::from(self.width),
+            0.5 * (y / hy + 1.0) * f64::from(self.height),
+        ])
+    }
+
+    /// Whether the lens draws something everywhere in the picture. What it draws is convex enough
+    /// for its edges to tell: a sample of them does.
+    #[must_use]
+    pub fn is_covered(&self) -> bool {
+        const SAMPLES: u32 = 64;
+        let (w, h) = (f64::from(self.width), f64::from(self.height));
+        (0..=SAMPLES).map(|k| f64::from(k) / f64::from(SAMPLES)).all(|s| {
+            [[s * w, 0.0], [s * w, h], [0.0, s * h], [w, s * h]]
+                .into_iter()
+                .all(|at| self.tangents(at).is_some())
+        })
     }
 }
 
@@ -147,5 +211,34 @@ mod tests {
                     && (to.dot(up) / depth).abs() <= y
             );
         }
+    }
+
+    /// With a lens and without: what is seen through a pixel is drawn there.
+    #[test]
+    fn pixel_to_ray_and_back() {
+        let lens = Lens { k1: -0.12, k2: 0.03, p1: 0.001, p2: -0.002, centre: [0.01, -0.02] };
+        for lens in [None, Some(lens)] {
+            let bounds = [Vec3::new(-3.0, 0.0, -1.0), Vec3::new(5.0, 2.0, 1.0)];
+            let camera = Camera { lens, fov_deg: 70.0, ..Camera::overview(bounds) };
+            assert!(camera.is_covered());
+            for k in 0..1000 {
+                let at = [(k % 40) as f32 * 24.5, (k / 40) as f32 * 28.5];
+                let point = camera.position + 7.0 * camera.direction(at[0], at[1]);
+                let [x, y] = camera.project(point.as_dvec3()).unwrap();
+                let off = (x - f64::from(at[0])).hypot(y - f64::from(at[1]));
+                assert!(off < 2e-3, "{at:?}: {x} {y}");
+            }
+            assert_eq!(camera.project((camera.position - camera.frame()[2]).as_dvec3()), None);
+        }
+    }
+
+    /// A strong barrel of a wide camera folds before the corners.
+    #[test]
+    fn a_lens_that_folds_the_picture_is_found_out() {
+        let lens = Some(Lens { k1: -0.3, ..Lens::default() });
+        let bounds = [Vec3::ZERO, Vec3::ONE];
+        let wide = Camera { lens, fov_deg: 100.0, ..Camera::overview(bounds) };
+        assert!(!wide.is_covered());
+        assert!(Camera { fov_deg: 40.0, ..wide }.is_covered());
     }
 }

@@ -68,6 +68,7 @@ fn seed() -> Model {
             width: 16,
             height: 9,
             exposure: 0.0,
+            lens: None,
         }],
         ..Model::default()
     }

@@ -158,6 +158,7 @@ fn rich() -> Model {
             width: 960,
             height: 720,
             exposure: 0.0,
+            lens: None,
         }],
         members: vec![
             member("C1", MemberKind::Column, Some("C40/50")),

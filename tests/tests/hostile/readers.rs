@@ -341,6 +341,7 @@ fn body(shape: Mesh, size: Vec3, transform: Mat4) -> Model {
             width: 8,
             height: 6,
             exposure: 0.0,
+            lens: None,
         }],
         members: vec![Member {
             id: "C1".into(),

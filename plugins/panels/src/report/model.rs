@@ -189,6 +189,7 @@ fn first(positions: &[Vec3], scene: &Scene, [width, height]: [u32; 2]) -> Camera
         width,
         height,
         exposure: 0.0,
+        lens: None,
     };
     camera.framing(low_high)
 }

@@ -535,6 +535,7 @@ impl View<'_> {
             width,
             height,
             exposure: 0.0,
+            lens: None,
         };
         camera.framing(bounds(&self.skin.rest))
     }

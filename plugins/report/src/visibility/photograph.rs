@@ -307,13 +307,16 @@ fn pixels(lit: &LitScene, camera: &Camera, stain: &Stain) -> Vec<u32> {
 }
 
 /// Columns and rows of a picture where a ball may be seen; all of them where it reaches behind the
-/// camera.
+/// camera, or where a lens bends the picture.
 fn window(camera: &Camera, centre: Vec3, reach: f32) -> [std::ops::Range<u32>; 2] {
     let ([right, up, forward], half) = (camera.frame(), camera.half_extent());
     let d = centre - camera.position;
     let depth = d.dot(forward);
     if depth + reach <= 0.0 {
         return [0..0, 0..0];
+    }
+    if camera.lens.is_some() {
+        return [0..camera.width, 0..camera.height];
     }
     let range = |along: f32, half: f32, pixels: u32| {
         if depth <= 1.5 * reach {

@@ -5,7 +5,7 @@ use std::collections::HashSet;
 use glam::Vec3;
 
 use super::*;
-use crate::{Damage, problem::Problem};
+use crate::{Damage, Lens, problem::Problem};
 
 /// Lengths beyond this are refused, m: single precision has no millimetres left.
 const FAR: f32 = 1e5;
@@ -1224,6 +1224,27 @@ impl Checker<'_> {
         self.count("width", k.width, 1, 16_384);
         self.count("height", k.height, 1, 16_384);
         self.within("exposure", k.exposure, -30.0, 30.0);
+        if let Some(lens) = &k.lens {
+            self.at("lens", |c| c.lens(lens, k));
+        }
+    }
+
+    fn lens(&mut self, lens: &Lens, k: &Camera) {
+        let Lens { k1, k2, p1, p2, centre: [right, down] } = *lens;
+        let mut is_sane = true;
+        for (name, value) in [("k1", k1), ("k2", k2), ("p1", p1), ("p2", p2)] {
+            is_sane &= self.within(name, value, -10.0, 10.0);
+        }
+        for shift in [right, down] {
+            is_sane &= self.within("centre", shift, -0.5, 0.5);
+        }
+        if is_sane && k.width > 0 && k.height > 0 && !super::resolve::camera(k).is_covered() {
+            self.error(
+                "",
+                "RANGE",
+                "folds the picture's edges back over it: check the numbers, or their order k1, k2, p1, p2",
+            );
+        }
     }
 
     fn meter(&mut self, meter: &Meter) {

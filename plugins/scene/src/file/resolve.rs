@@ -801,7 +801,7 @@ fn suspicious(scene: &mut Scene) {
     }
 }
 
-fn camera(k: &super::Camera) -> crate::Camera {
+pub(super) fn camera(k: &super::Camera) -> crate::Camera {
     crate::Camera {
         name: k.name.clone(),
         position: k.position,
@@ -811,6 +811,7 @@ fn camera(k: &super::Camera) -> crate::Camera {
         width: k.width,
         height: k.height,
         exposure: k.exposure,
+        lens: k.lens,
     }
 }
 

@@ -4,6 +4,8 @@ use glam::{EulerRot, Mat4, Quat, Vec3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::Lens;
+
 fn one() -> Vec3 {
     Vec3::ONE
 }
@@ -326,6 +328,9 @@ pub struct Camera {
     /// Stops.
     #[serde(default)]
     pub exposure: f32,
+    /// How its lens distorts; none: straight lines stay straight.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lens: Option<Lens>,
 }
 
 /// A light meter: irradiance on a flat patch.

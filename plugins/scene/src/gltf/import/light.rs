@@ -83,5 +83,6 @@ pub(super) fn camera(json: &Value, world: &DMat4, node: &str, notes: &mut Notes)
         width: width.round() as u32,
         height: height.round() as u32,
         exposure: 0.0,
+        lens: None,
     })
 }

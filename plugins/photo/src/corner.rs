@@ -1,0 +1,101 @@
+//! Corners and edges of members: what can be picked in a photograph, and what is drawn over it.
+
+use std::collections::HashMap;
+
+use glam::DVec3;
+
+use crate::face::{Chart, Surface, normal};
+
+/// Cosine between normals on two sides of an edge: sharper than 30°.
+const SHARP: f64 = 0.866;
+/// Volume that three unit normals of a corner span.
+const SOLID: f64 = 0.2;
+/// Vertices nearer than this share of the member's size are one.
+const SAME: f64 = 1e-5;
+
+/// What is sharp of a member's surface.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Outline {
+    /// Corners, m, by their place along the axis and then by their angle about it; of round members
+    /// the ends of their rims at 0, 90, 180 and 270 degrees.
+    pub corners: Vec<DVec3>,
+    /// Edges, m.
+    pub edges: Vec<[DVec3; 2]>,
+}
+
+impl Surface {
+    /// Its corners and edges.
+    #[must_use]
+    pub fn outline(&self) -> Outline {
+        let (places, triangles) = self.welded();
+        let normals: Vec<DVec3> = self.triangles.iter().map(normal).collect();
+        let mut at_vertex: Vec<Vec<DVec3>> = vec![Vec::new(); places.len()];
+        let mut at_edge: HashMap<[usize; 2], Vec<DVec3>> = HashMap::new();
+        for (corners, normal) in triangles.iter().zip(&normals) {
+            if *normal == DVec3::ZERO {
+                continue;
+            }
+            for k in 0..3 {
+                let [a, b] = [corners[k], corners[(k + 1) % 3]];
+                at_vertex[a].push(*normal);
+                at_edge.entry([a.min(b), a.max(b)]).or_default().push(*normal);
+            }
+        }
+        let is_sharp = |normals: &Vec<DVec3>| match normals[..] {
+            [a, b] => a.dot(b) < SHARP,
+            _ => true,
+        };
+        let mut edges: Vec<[usize; 2]> =
+            at_edge.iter().filter(|(_, normals)| is_sharp(normals)).map(|(e, _)| *e).collect();
+        edges.sort_unstable();
+        let corners = match self.faces.first().map(|face| face.chart) {
+            Some(Chart::Around(radius) | Chart::Inside(radius)) => self.rims(radius),
+            _ => {
+                let solid = (0..places.len()).filter(|&i| is_corner(&at_vertex[i]));
+                self.in_order(solid.map(|i| places[i]).collect())
+            }
+        };
+        Outline { corners, edges: edges.into_iter().map(|e| e.map(|i| places[i])).collect() }
+    }
+
+    /// Vertices, those at one place taken together, and triangles of these.
+    fn welded(&self) -> (Vec<DVec3>, Vec<[usize; 3]>) {
+        let all = || self.triangles.iter().flatten().map(|p| p.as_dvec3());
+        let (low, high) =
+            all().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), p| (l.min(p), h.max(p)));
+        let cell = (SAME * (high - low).max_element()).max(1e-9);
+        let (mut known, mut places) = (HashMap::new(), Vec::new());
+        let mut index = |p: DVec3| {
+            *known.entry(((p - low) / cell).round().as_i64vec3()).or_insert_with(|| {
+                places.push(p);
+                places.len() - 1
+            })
+        };
+        let triangles = self.triangles.iter().map(|t| t.map(|p| index(p.as_dvec3()))).collect();
+        (places, triangles)
+    }
+
+    fn in_order(&self, mut corners: Vec<DVec3>) -> Vec<DVec3> {
+        let key = |p: &DVec3| {
+            let (along, angle) = self.coordinates(*p);
+            ((1e3 * along).round() as i64, (10.0 * angle).round() as i64 % 3600)
+        };
+        corners.sort_by_key(key);
+        corners
+    }
+}
+
+/// Whether three of the planes that meet at a vertex meet there alone.
+fn is_corner(normals: &[DVec3]) -> bool {
+    let mut planes: Vec<DVec3> = Vec::new();
+    for normal in normals {
+        if planes.iter().all(|known| known.dot(*normal) < SHARP) {
+            planes.push(*normal);
+        }
+    }
+    let n = planes.len();
+    (0..n).any(|i| {
+        (i + 1..n)
+            .any(|j| (j + 1..n).any(|k| planes[i].cross(planes[j]).dot(planes[k]).abs() > SOLID))
+    })
+}

@@ -1,0 +1,20 @@
+#![doc = include_str!("../README.md")]
+
+pub mod closeup;
+pub mod corner;
+pub mod face;
+pub mod map;
+pub mod overlay;
+pub mod picks;
+pub mod picture;
+pub mod pose;
+pub mod record;
+pub mod series;
+mod similarity;
+pub mod site;
+pub mod taken;
+
+pub use map::{FaceMap, unrolled};
+pub use picture::{Photograph, PictureError};
+pub use pose::{Located, Pick, Pose, PoseError, Prior, locate};
+pub use site::{Sight, Site};

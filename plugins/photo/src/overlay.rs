@@ -1,0 +1,116 @@
+//! A photograph with the model's edges and the picks drawn over it.
+
+use glam::{DVec3, Vec3};
+use intrados_scene::{Ray, tracer::Scratch};
+
+use crate::{Photograph, Pick, Pose, picture::srgb, site::Site};
+
+/// Longest side of the picture, pixels.
+const LONGEST: u32 = 2400;
+/// Edges are drawn piece by piece, so long in the picture, pixels.
+const PIECE: f64 = 4.0;
+/// Most pieces of one edge.
+const MOST_PIECES: f64 = 4096.0;
+/// An edge lies in its own surface: what is nearer by less than this share does not hide it.
+const NEAR: f64 = 2e-3;
+
+const EDGE: [u8; 3] = [0, 230, 255];
+const PICKED: [u8; 3] = [255, 60, 200];
+
+/// A picture in sRGB, by rows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Overlay {
+    /// Pixels across and down.
+    pub size: [u32; 2],
+    /// Red, green, blue.
+    pub rgb: Vec<u8>,
+}
+
+impl Overlay {
+    /// A photograph, made smaller where it is large, with edges that its camera sees (cyan), the
+    /// picks as they were picked (magenta crosses), and a ring where each is drawn.
+    #[must_use]
+    pub fn new(
+        photograph: &Photograph,
+        pose: &Pose,
+        edges: &[[DVec3; 2]],
+        picks: &[Pick],
+        site: &Site,
+    ) -> Self {
+        let shrink = photograph.size[0].max(photograph.size[1]).div_ceil(LONGEST).max(1);
+        let mut overlay = Self::shrunk(photograph, shrink);
+        let to_overlay = |[x, y]: [f64; 2]| [x / f64::from(shrink), y / f64::from(shrink)];
+        let thickness = (f64::from(overlay.size[0]) / 900.0).clamp(0.7, 2.0);
+        for place in edges.iter().flat_map(|edge| seen(pose, edge, site, f64::from(shrink))) {
+            if let Some(at) = pose.project(place) {
+                overlay.dot(to_overlay(at), thickness, EDGE);
+            }
+        }
+        for pick in picks {
+            let at = to_overlay(pick.pixel);
+            for k in -8..=8 {
+                let d = f64::from(k);
+                overlay.dot([at[0] + d, at[1]], 0.7, PICKED);
+                overlay.dot([at[0], at[1] + d], 0.7, PICKED);
+            }
+            if let Some(drawn) = pose.project(pick.place).map(to_overlay) {
+                for k in 0..48 {
+                    let (sin, cos) = (f64::from(k) * std::f64::consts::TAU / 48.0).sin_cos();
+                    overlay.dot([drawn[0] + 10.0 * cos, drawn[1] + 10.0 * sin], 0.7, EDGE);
+                }
+            }
+        }
+        overlay
+    }
+
+    fn shrunk(photograph: &Photograph, shrink: u32) -> Self {
+        let size = photograph.size.map(|n| (n / shrink).max(1));
+        let mut rgb = Vec::with_capacity(3 * size[0] as usize * size[1] as usize);
+        for y in 0..size[1] {
+            for x in 0..size[0] {
+                let (mut sum, mut count) = (Vec3::ZERO, 0.0);
+                for (i, j) in (0..shrink).flat_map(|i| (0..shrink).map(move |j| (i, j))) {
+                    if let Some(light) = photograph.light(x * shrink + i, y * shrink + j) {
+                        (sum, count) = (sum + light, count + 1.0);
+                    }
+                }
+                rgb.extend((sum / f32::max(count, 1.0)).to_array().map(srgb));
+            }
+        }
+        Self { size, rgb }
+    }
+
+    fn dot(&mut self, [x, y]: [f64; 2], radius: f64, colour: [u8; 3]) {
+        let [width, height] = self.size.map(i64::from);
+        let range = |c: f64| (c - radius - 0.5).floor() as i64..=(c + radius - 0.5).ceil() as i64;
+        for (i, j) in range(x).flat_map(|i| range(y).map(move |j| (i, j))) {
+            let is_in = (0..width).contains(&i) && (0..height).contains(&j);
+            if is_in && (i as f64 + 0.5 - x).hypot(j as f64 + 0.5 - y) <= radius.max(0.7) {
+                let first = 3 * (j * width + i) as usize;
+                self.rgb[first..first + 3].copy_from_slice(&colour);
+            }
+        }
+    }
+}
+
+/// Points of an edge that the camera sees, so close that they make a line.
+fn seen(pose: &Pose, [a, b]: &[DVec3; 2], site: &Site, shrink: f64) -> Vec<DVec3> {
+    // What an edge is long in the picture, at its nearest.
+    let near = [a, b, &(0.5 * (*a + *b))].map(|p| p.distance(pose.position));
+    let near = near.into_iter().fold(f64::INFINITY, f64::min).max(0.05);
+    let length = pose.focal_px * a.distance(*b) / near;
+    let pieces = (4.0 * length / (PIECE * shrink)).ceil().clamp(2.0, MOST_PIECES) as u32;
+    let places: Vec<DVec3> = (0..=pieces)
+        .map(|k| a.lerp(*b, f64::from(k) / f64::from(pieces)))
+        .filter(|place| pose.project(*place).is_some_and(|at| pose.holds(at)))
+        .collect();
+    let rays: Vec<Ray> = places
+        .iter()
+        .map(|place| {
+            let to = (*place - pose.position).as_vec3();
+            Ray::new(pose.position.as_vec3(), to, (1.0 - NEAR) as f32)
+        })
+        .collect();
+    let clear = site.are_clear(&rays, &mut Scratch::default());
+    places.into_iter().zip(clear).filter_map(|(place, clear)| clear.then_some(place)).collect()
+}
