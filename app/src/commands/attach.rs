@@ -17,6 +17,9 @@ use crate::{
     session::Session,
 };
 
+/// Files that are listed for people.
+const SHOWN: usize = 5;
+
 /// Schema `intrados.attach/1`.
 #[derive(Debug, Serialize)]
 struct Report {
@@ -323,7 +326,10 @@ impl Report {
     fn table(&self) -> String {
         let mut text = format!("{} of {}, in {}\n", self.name, self.member, self.evidence);
         text += &output::table(&rows(&self.added));
-        self.files.iter().for_each(|file| text += &format!("file {file}\n"));
+        self.files.iter().take(SHOWN).for_each(|file| text += &format!("file {file}\n"));
+        if self.files.len() > SHOWN {
+            text += &format!("and {} more files\n", self.files.len() - SHOWN);
+        }
         text
     }
 }

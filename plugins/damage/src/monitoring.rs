@@ -110,8 +110,7 @@ fn told(drifts: Vec<Drift>, zones: Zones) -> Option<Evidence> {
         })
         .collect();
     let basis = format!(
-        "{samples} readings of {} gauges over the years; {}; says nothing beyond their zones",
-        drifts.len(),
+        "{samples} readings over the years; {}; says nothing beyond its zone",
         lines.join("; ")
     );
     let evidence = Evidence::new(MONITORING, true, [(Cause::Stiffness, zones)].into(), basis)?;

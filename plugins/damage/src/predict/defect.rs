@@ -4,12 +4,16 @@ use intrados_scene::{
     Scene,
     structure::{Course, Observation, Shows},
 };
+use intrados_stage::Estimate;
 use serde::Serialize;
 
 use intrados_ct::Picture;
 
 use super::{CT, SliceReading, section::widest};
-use crate::survey::{self, SURVEY};
+use crate::{
+    survey::{self, SURVEY},
+    zone::zone_at,
+};
 
 /// Longer side of a defect's picture, pixels.
 const LOOK: u32 = 240;
@@ -55,7 +59,7 @@ impl Defect {
 #[must_use]
 pub(crate) fn defects(scene: &Scene, member: &str, slices: &[SliceReading]) -> Vec<Defect> {
     let seen = survey::of_member(scene, member).filter_map(|(_, o)| seen(o));
-    seen.chain(slices.iter().flat_map(sectioned)).collect()
+    seen.chain(grouped(slices).iter().flat_map(|group| sectioned(group))).collect()
 }
 
 /// What an observation found; none where it is a reading of an instrument, or where nothing was.
@@ -106,15 +110,17 @@ fn seen(o: &Observation) -> Option<Defect> {
     Some(defect)
 }
 
-/// What a slice shows: its widest crack, what has fallen off, and what is gone of its bars, each
-/// where it is more than its error.
-fn sectioned(slice: &SliceReading) -> Vec<Defect> {
-    let angle = slice.drilled.as_ref().and_then(|d| d.angle_deg).map(f64::from);
-    let defect = |kind, size| Defect {
+/// What the sections of a core show in one zone, of which many may show the same: the widest crack,
+/// what has fallen off, and what is gone of its bars, each where it is more than its error.
+fn sectioned(sections: &[&SliceReading]) -> Vec<Defect> {
+    let of = |slice: &SliceReading, kind, size, shown: usize| Defect {
         kind,
         along: slice.along.map(|along| [along; 2]),
-        angle_deg: angle,
-        size,
+        angle_deg: slice.drilled.and_then(|d| d.angle_deg).map(f64::from),
+        size: match sections.len() {
+            1 => size,
+            all => format!("{size}, in {shown} of {all} sections"),
+        },
         width_mm: None,
         length_m: None,
         area_m2: None,
@@ -123,18 +129,41 @@ fn sectioned(slice: &SliceReading) -> Vec<Defect> {
         date: slice.drilled.and_then(|d| d.date).map(|d| d.to_string()),
         picture: None,
     };
-    let crack = widest(&slice.cracks).map(|crack| Defect {
+    let cracked = || sections.iter().filter_map(|s| Some((*s, widest(&s.cracks)?)));
+    let worst = cracked().max_by(|a, b| a.1.width_mm.total_cmp(&b.1.width_mm));
+    let crack = worst.map(|(slice, crack)| Defect {
         picture: slice.widest.clone(),
         width_mm: Some(crack.width_mm),
         length_m: Some(1e-3 * slice.cracks.iter().map(|c| c.length_mm).sum::<f64>()),
-        ..defect("crack in the section", format!("{:.2} mm wide", crack.width_mm))
+        ..of(
+            slice,
+            "crack in the section",
+            format!("{:.2} mm wide", crack.width_mm),
+            cracked().count(),
+        )
     });
-    let share = |kind, lost: Option<intrados_stage::Estimate>| {
-        let lost = lost.filter(|l| l.value > 1.96 * l.std_error && l.value > 0.0)?;
-        let [value, error] = [lost.value, lost.std_error].map(|x| 100.0 * x);
-        Some(defect(kind, format!("{value:.1} ± {error:.1} % of the section")))
+    let share = |kind, lost: &dyn Fn(&SliceReading) -> Option<Estimate>| {
+        let beyond = |l: &Estimate| l.value > 1.96 * l.std_error && l.value > 0.0;
+        let found = || sections.iter().filter_map(|s| Some((*s, lost(s).filter(beyond)?)));
+        let (slice, worst) = found().max_by(|a, b| a.1.value.total_cmp(&b.1.value))?;
+        let [value, error] = [worst.value, worst.std_error].map(|x| 100.0 * x);
+        let size = format!("{value:.1} ± {error:.1} % of the section");
+        Some(of(slice, kind, size, found().count()))
     };
-    let off = share("fallen off", slice.lost);
-    let rust = share("bars rusted away", slice.steel.map(|s| s.loss));
+    let off = share("fallen off", &|s| s.lost);
+    let rust = share("bars rusted away", &|s| Some(s.steel?.loss));
     [crack, off, rust].into_iter().flatten().collect()
+}
+
+/// Sections by core and zone, in the order of the first of each.
+fn grouped(slices: &[SliceReading]) -> Vec<Vec<&SliceReading>> {
+    let place = |s: &SliceReading| (s.core_number, s.along.map(zone_at));
+    let mut groups: Vec<Vec<&SliceReading>> = Vec::new();
+    for slice in slices {
+        match groups.iter_mut().find(|g| place(g[0]) == place(slice)) {
+            Some(group) => group.push(slice),
+            None => groups.push(vec![slice]),
+        }
+    }
+    groups
 }
