@@ -3,6 +3,7 @@
 pub mod attach;
 pub mod crack;
 pub mod file;
+pub mod finish;
 pub mod gltf;
 pub mod import;
 pub mod lamp;
@@ -21,6 +22,7 @@ pub mod tracer;
 
 pub use crack::{CrackSurface, Mouth, Spalled, SurfaceDamage, SurfaceFile};
 pub use file::reference;
+pub use finish::{Finish, FinishKind};
 pub use lamp::{Lamp, LampKind};
 pub use load::{Card, ErrorKind, LoadError, bundled, cards, validate};
 pub use material::{Material, Surface, Texture, TextureRef, Wrap};

@@ -1,0 +1,135 @@
+//! Noise: smooth random functions of a place, without a state.
+//!
+//! Detail finer than the footprint of a pixel is left out, octave by octave, so that nothing
+//! flickers at a distance: what remains is its mean.
+
+use glam::{Vec2, vec2};
+use intrados_stage::random::Key;
+
+/// Random bits of a cell of a grid.
+#[inline]
+pub(super) fn bits(key: Key, [i, j]: [i32; 2], dimension: u32) -> u32 {
+    let row = (i as u32).wrapping_mul(0x9e37_79b1);
+    let column = (j as u32).wrapping_mul(0x85eb_ca6b);
+    Key(key.0 ^ row, key.1.wrapping_add(column)).bits(dimension)
+}
+
+/// Uniform in [0, 1), of a cell of a grid.
+#[inline]
+pub(super) fn unit(key: Key, cell: [i32; 2], dimension: u32) -> f32 {
+    (bits(key, cell, dimension) >> 8) as f32 * (1.0 / 16_777_216.0)
+}
+
+/// The cell of a unit grid that a place is in, and where in it, [0, 1)².
+#[inline]
+pub(super) fn cell(p: Vec2) -> ([i32; 2], Vec2) {
+    let floor = p.floor();
+    ([floor.x as i32, floor.y as i32], p - floor)
+}
+
+/// 0 below `low`, 1 above `high`, a smooth step between.
+#[inline]
+pub(super) fn step(low: f32, high: f32, x: f32) -> f32 {
+    let t = ((x - low) / (high - low)).clamp(0.0, 1.0);
+    t * t * (3.0 - 2.0 * t)
+}
+
+/// How much is left to see of a detail of that size, m: nothing below a footprint, all of it above
+/// three.
+#[inline]
+pub(super) fn visible(size: f32, footprint: f32) -> f32 {
+    step(1.0, 3.0, size / footprint.max(1e-9))
+}
+
+/// Gradient noise (Perlin 1985, with the quintic of 2002) on a unit grid: mean 0, within [−1, 1],
+/// root mean square about .3.
+#[inline]
+pub(super) fn smooth(key: Key, p: Vec2) -> f32 {
+    let ([i, j], f) = cell(p);
+    let corner = |di: i32, dj: i32| {
+        let h = bits(key, [i.wrapping_add(di), j.wrapping_add(dj)], 0);
+        let signed = |h: u32| (h & 0xffff) as f32 * (1.0 / 32_768.0) - 1.0;
+        vec2(signed(h), signed(h >> 16)).dot(f - vec2(di as f32, dj as f32))
+    };
+    let fade = f * f * f * (f * (f * 6.0 - 15.0) + 10.0);
+    let along = |dj: i32| {
+        let (a, b) = (corner(0, dj), corner(1, dj));
+        a + (b - a) * fade.x
+    };
+    let (a, b) = (along(0), along(1));
+    a + (b - a) * fade.y
+}
+
+/// Octaves of noise from wave length `size` (m) downward, each half as long and `gain` as strong;
+/// those finer than the footprint are left out. Root mean square about .35.
+pub(super) fn octaves(
+    key: Key,
+    p: Vec2,
+    size: f32,
+    count: u32,
+    gain: f32,
+    footprint: f32,
+) -> f32 {
+    let (mut sum, mut scale, mut strength) = (0.0, 1.0 / size, 1.0);
+    for octave in 0..count {
+        let seen = visible(0.5 / scale, footprint);
+        if seen <= 0.0 {
+            break;
+        }
+        // Each octave on a grid of its own, so that no lattice shows.
+        let turned = vec2(0.8 * p.x - 0.6 * p.y, 0.6 * p.x + 0.8 * p.y);
+        let at = if octave % 2 == 0 { p } else { turned };
+        let key = Key(key.0.wrapping_add(octave), key.1);
+        sum += seen * strength * smooth(key, at * scale);
+        scale *= 2.0;
+        strength *= gain;
+    }
+    sum
+}
+
+/// Cells around scattered points (Worley 1996) on a unit grid: squared distances to the nearest
+/// two points, and the cell of the nearest.
+pub(super) fn scattered(key: Key, p: Vec2) -> ([f32; 2], [i32; 2]) {
+    let ([i, j], f) = cell(p);
+    let (mut nearest, mut whose) = ([f32::INFINITY; 2], [i, j]);
+    for di in -1..=1 {
+        for dj in -1..=1 {
+            let cell = [i.wrapping_add(di), j.wrapping_add(dj)];
+            let h = bits(key, cell, 1);
+            let at = vec2((h & 0xffff) as f32, (h >> 16) as f32) * (1.0 / 65_536.0);
+            let d = (vec2(di as f32, dj as f32) + at - f).length_squared();
+            if d < nearest[0] {
+                nearest = [d, nearest[0]];
+                whose = cell;
+            } else {
+                nearest[1] = nearest[1].min(d);
+            }
+        }
+    }
+    (nearest, whose)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn noise_is_smooth_has_no_mean_and_fades_below_the_footprint() {
+        let key = Key::new(3, 4);
+        let n = 200_000_u64;
+        let place = |i: u64| Vec2::from(Key::new(9, i).pair(0)) * 300.0;
+        let values: Vec<f64> =
+            (0..n).map(|i| f64::from(octaves(key, place(i), 1.0, 4, 0.5, 1e-4))).collect();
+        let mean = values.iter().sum::<f64>() / n as f64;
+        let square = values.iter().map(|v| v * v).sum::<f64>() / n as f64;
+        // Places are independent but for the 300² cells: 5 standard errors.
+        assert!(mean.abs() < 5.0 * (square / 90_000.0).sqrt(), "{mean}");
+        assert!((0.2..0.5).contains(&square.sqrt()), "{}", square.sqrt());
+        for i in 0..1000 {
+            let (p, d) = (place(i), vec2(1e-3, 0.0));
+            assert!((smooth(key, p + d) - smooth(key, p)).abs() < 1e-2);
+        }
+        // Wave length 1, footprint 2: nothing is left but the mean.
+        assert_eq!(octaves(key, place(1), 1.0, 4, 0.5, 2.0), 0.0);
+    }
+}
