@@ -29,7 +29,7 @@ pub(super) fn cell(p: Vec2) -> ([i32; 2], Vec2) {
 
 /// 0 below `low`, 1 above `high`, a smooth step between.
 #[inline]
-pub(super) fn step(low: f32, high: f32, x: f32) -> f32 {
+pub(crate) fn step(low: f32, high: f32, x: f32) -> f32 {
     let t = ((x - low) / (high - low)).clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
 }
@@ -44,7 +44,7 @@ pub(super) fn visible(size: f32, footprint: f32) -> f32 {
 /// Gradient noise (Perlin 1985, with the quintic of 2002) on a unit grid: mean 0, within [−1, 1],
 /// root mean square about .3.
 #[inline]
-pub(super) fn smooth(key: Key, p: Vec2) -> f32 {
+pub(crate) fn smooth(key: Key, p: Vec2) -> f32 {
     let ([i, j], f) = cell(p);
     let corner = |di: i32, dj: i32| {
         let h = bits(key, [i.wrapping_add(di), j.wrapping_add(dj)], 0);
@@ -62,7 +62,7 @@ pub(super) fn smooth(key: Key, p: Vec2) -> f32 {
 
 /// Octaves of noise from wave length `size` (m) downward, each half as long and `gain` as strong;
 /// those finer than the footprint are left out. Root mean square about .35.
-pub(super) fn octaves(
+pub(crate) fn octaves(
     key: Key,
     p: Vec2,
     size: f32,
@@ -70,21 +70,36 @@ pub(super) fn octaves(
     gain: f32,
     footprint: f32,
 ) -> f32 {
-    let (mut sum, mut scale, mut strength) = (0.0, 1.0 / size, 1.0);
+    octaves_and_rest(key, p, size, count, gain, footprint)[0]
+}
+
+/// The same, and the root mean square of what was left out.
+pub(super) fn octaves_and_rest(
+    key: Key,
+    p: Vec2,
+    size: f32,
+    count: u32,
+    gain: f32,
+    footprint: f32,
+) -> [f32; 2] {
+    let (mut sum, mut rest, mut scale, mut strength) = (0.0, 0.0, 1.0 / size, 1.0);
     for octave in 0..count {
         let seen = visible(0.5 / scale, footprint);
-        if seen <= 0.0 {
-            break;
+        if seen < 1.0 {
+            let missing = 0.28 * (1.0 - seen) * strength;
+            rest += missing * missing;
         }
-        // Each octave on a grid of its own, so that no lattice shows.
-        let turned = vec2(0.8 * p.x - 0.6 * p.y, 0.6 * p.x + 0.8 * p.y);
-        let at = if octave % 2 == 0 { p } else { turned };
-        let key = Key(key.0.wrapping_add(octave), key.1);
-        sum += seen * strength * smooth(key, at * scale);
+        if seen > 0.0 {
+            // Each octave on a grid of its own, so that no lattice shows.
+            let turned = vec2(0.8 * p.x - 0.6 * p.y, 0.6 * p.x + 0.8 * p.y);
+            let at = if octave % 2 == 0 { p } else { turned };
+            let key = Key(key.0.wrapping_add(octave), key.1);
+            sum += seen * strength * smooth(key, at * scale);
+        }
         scale *= 2.0;
         strength *= gain;
     }
-    sum
+    [sum, rest.sqrt()]
 }
 
 /// Cells around scattered points (Worley 1996) on a unit grid: squared distances to the nearest

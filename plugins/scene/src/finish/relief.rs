@@ -308,6 +308,9 @@ impl Rough {
     }
 }
 
+/// Share of a paving's face that is matrix.
+const BETWEEN: f32 = 0.42;
+
 impl Stones {
     /// How far from the border to the next stone, and whose place it is.
     fn stone(&self, key: Key, at: Vec2) -> (f32, [i32; 2]) {
@@ -328,11 +331,11 @@ impl Stones {
     fn tone(&self, key: Key, at: Vec2, footprint: f32) -> f32 {
         let seen = visible(self.size, footprint);
         if seen <= 0.0 {
-            return 1.0 - 0.25 * self.dark;
+            return 1.0 - BETWEEN * self.dark;
         }
         let (border, stone) = self.stone(key, at);
         let own = 1.0 + self.tone * (unit(key, stone, 3) - 0.5);
         let matrix = 1.0 - self.dark * (1.0 - step(0.02, 0.3, border));
-        1.0 - 0.25 * self.dark + seen * (own * matrix - 1.0 + 0.25 * self.dark)
+        1.0 - BETWEEN * self.dark + seen * (own * matrix - 1.0 + BETWEEN * self.dark)
     }
 }

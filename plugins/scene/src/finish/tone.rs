@@ -3,7 +3,7 @@
 use glam::{Vec2, Vec3, vec2};
 use intrados_stage::random::Key;
 
-use super::noise::{bits, cell, octaves, smooth, step, unit, visible};
+use super::noise::{bits, cell, octaves, octaves_and_rest, smooth, step, unit, visible};
 
 /// The paste: blotches, clouds and grain.
 #[derive(Debug, Clone, PartialEq)]
@@ -170,6 +170,14 @@ impl Base {
 }
 
 impl Mark {
+    /// Whether it is rust or efflorescence.
+    pub(super) fn is_stain(&self) -> bool {
+        let (Self::Patches(Patches { cover, .. }) | Self::Runs(Runs { cover, .. })) = self else {
+            return false;
+        };
+        cover.matter != Matter::Dirt
+    }
+
     pub(super) fn lay(&self, key: Key, at: Vec2, footprint: f32, seen: &mut Seen) {
         match self {
             Self::Patches(patches) => patches.lay(key, at, footprint, seen),
@@ -191,8 +199,10 @@ fn own(key: Key, number: u32, colour: Vec3, size: f32) -> Key {
 impl Patches {
     fn lay(&self, key: Key, at: Vec2, footprint: f32, seen: &mut Seen) {
         let key = own(key, 50, self.cover.colour, self.size);
-        let noise = octaves(key, at / vec2(1.0, self.tall), self.size, 5, 0.6, footprint);
-        let share = step(self.from, self.from + self.border, noise);
+        let at = at / vec2(1.0, self.tall);
+        let [noise, rest] = octaves_and_rest(key, at, self.size, 5, 0.6, footprint);
+        // What cannot be told apart any more covers its mean share.
+        let share = step(self.from - 1.7 * rest, self.from + self.border + 1.7 * rest, noise);
         if share > 0.0 {
             seen.cover(&self.cover, share);
         }
@@ -328,8 +338,8 @@ impl Band {
         if border <= 0.0 {
             return;
         }
-        let flaked = octaves(key, at, 0.06, 5, 0.75, footprint);
-        let stays = step(self.worn - 0.55, self.worn - 0.45, flaked);
+        let [flaked, rest] = octaves_and_rest(key, at, 0.06, 5, 0.75, footprint);
+        let stays = step(self.worn - 0.55 - 1.7 * rest, self.worn - 0.45 + 1.7 * rest, flaked);
         seen.colour = seen.colour.lerp(self.colour, border * stays);
     }
 }
