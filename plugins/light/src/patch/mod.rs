@@ -11,7 +11,7 @@ mod scenery;
 use std::sync::Arc;
 
 use glam::{Vec2, Vec3, vec2};
-use intrados_scene::{Camera, Hit, Ray, Scene, tracer::Scratch};
+use intrados_scene::{Camera, Hit, Ray, tracer::Scratch};
 use intrados_stage::{Cancelled, Job, random::Key};
 use intrados_transport::WalkRule;
 

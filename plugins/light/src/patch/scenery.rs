@@ -175,13 +175,14 @@ impl Builder {
         let number = [0, 0, 1, 1, 1, 2, 2, 3][self.draw.count(0, 7)];
         let mut cracks = Vec::new();
         for n in 0..number {
-            let pixels = self.log(0.25, if self.draw.chance(0.15) { 14.0 } else { 4.0 });
+            let widest = if self.draw.chance(0.15) { 14.0 } else { 4.0 };
+            let pixels = self.log(0.25, widest);
             let seed = Seed {
-                at: self.somewhere(1.1),
+                at: self.somewhere(1.3),
                 way: self.between(0.0, 2.0 * PI),
-                length: self.log(0.2, 1.6) * self.side,
+                length: self.log(0.3, 2.5) * self.side,
                 width: (pixels * pixel).clamp(5e-5, 15e-3),
-                unrest: self.log(0.6, 5.0) / self.side.sqrt(),
+                unrest: self.log(0.5, 2.5) / self.side.sqrt(),
                 forks: if self.draw.chance(0.4) { self.log(0.5, 4.0) / self.side } else { 0.0 },
                 free: self.draw.chance(0.6),
             };

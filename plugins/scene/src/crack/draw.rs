@@ -275,13 +275,13 @@ fn chips(ribs: &[Rib], key: Key) -> Vec<Bowl> {
         if width < CHIPPED || key.unit(100 + 4 * number) > share {
             continue;
         }
-        let size = 1.2e-3 + width * f64::from(0.6 + 1.6 * key.unit(101 + 4 * number));
+        let size = 0.8e-3 + width * f64::from(0.4 + 0.8 * key.unit(101 + 4 * number));
         let lip = usize::from(key.unit(102 + 4 * number) > 0.5);
         chips.push(Bowl {
             centre: pair[0].lips[lip],
             outward: pair[0].outward,
             radius: size,
-            depth: 0.35 * size,
+            depth: 0.3 * size,
             spall: None,
             key: key.split(3, number),
         });

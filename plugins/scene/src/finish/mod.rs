@@ -101,11 +101,18 @@ impl Finish {
     pub fn at(&self, at: Vec2, footprint: f32, colour: Vec3) -> Appearance {
         let footprint = footprint.max(1e-5);
         let step = (0.5 * footprint).max(1e-4);
-        let here = self.height(at, footprint);
-        let slope = vec2(
-            self.height(at + vec2(step, 0.0), footprint) - here,
-            self.height(at + vec2(0.0, step), footprint) - here,
-        ) / step;
+        let slope = self
+            .reliefs
+            .iter()
+            .map(|relief| {
+                relief.slope(self.key, at, footprint).unwrap_or_else(|| {
+                    let height = |at| relief.height(self.key, at, footprint);
+                    let here = height(at);
+                    let [u, v] = [vec2(step, 0.0), vec2(0.0, step)].map(|d| height(at + d) - here);
+                    vec2(u, v) / step
+                })
+            })
+            .sum::<Vec2>();
         let shade = self.reliefs.iter().fold(1.0, |tone, relief| {
             tone * relief.tone(self.key, at, footprint)
         });
@@ -121,11 +128,6 @@ impl Finish {
             rust,
             efflorescence,
         }
-    }
-
-    /// Height of the relief over the mean face, m.
-    fn height(&self, at: Vec2, footprint: f32) -> f32 {
-        self.reliefs.iter().map(|relief| relief.height(self.key, at, footprint)).sum()
     }
 }
 

@@ -60,6 +60,56 @@ pub(crate) fn smooth(key: Key, p: Vec2) -> f32 {
     a + (b - a) * fade.y
 }
 
+/// [`smooth`] with its slope.
+#[inline]
+fn smooth_slope(key: Key, p: Vec2) -> (f32, Vec2) {
+    let ([i, j], f) = cell(p);
+    let corner = |di: i32, dj: i32| {
+        let h = bits(key, [i.wrapping_add(di), j.wrapping_add(dj)], 0);
+        let signed = |h: u32| (h & 0xffff) as f32 * (1.0 / 32_768.0) - 1.0;
+        let g = vec2(signed(h), signed(h >> 16));
+        (g.dot(f - vec2(di as f32, dj as f32)), g)
+    };
+    let fade = f * f * f * (f * (f * 6.0 - 15.0) + 10.0);
+    let steep = 30.0 * f * f * (f * (f - 2.0) + 1.0);
+    let along = |dj: i32| {
+        let ((a, da), (b, db)) = (corner(0, dj), corner(1, dj));
+        let slope = da + (db - da) * fade.x + vec2((b - a) * steep.x, 0.0);
+        (a + (b - a) * fade.x, slope)
+    };
+    let ((a, da), (b, db)) = (along(0), along(1));
+    (a + (b - a) * fade.y, da + (db - da) * fade.y + vec2(0.0, (b - a) * steep.y))
+}
+
+/// Slope of [`octaves`] by place.
+pub(super) fn octaves_slope(
+    key: Key,
+    p: Vec2,
+    size: f32,
+    count: u32,
+    gain: f32,
+    footprint: f32,
+) -> Vec2 {
+    let (mut sum, mut scale, mut strength) = (Vec2::ZERO, 1.0 / size, 1.0);
+    for octave in 0..count {
+        let seen = visible(0.5 / scale, footprint);
+        if seen <= 0.0 {
+            break;
+        }
+        let key = Key(key.0.wrapping_add(octave), key.1);
+        sum += seen * strength * scale * if octave % 2 == 0 {
+            smooth_slope(key, p * scale).1
+        } else {
+            let turned = vec2(0.8 * p.x - 0.6 * p.y, 0.6 * p.x + 0.8 * p.y);
+            let slope = smooth_slope(key, turned * scale).1;
+            vec2(0.8 * slope.x + 0.6 * slope.y, 0.8 * slope.y - 0.6 * slope.x)
+        };
+        scale *= 2.0;
+        strength *= gain;
+    }
+    sum
+}
+
 /// Octaves of noise from wave length `size` (m) downward, each half as long and `gain` as strong;
 /// those finer than the footprint are left out. Root mean square about .35.
 pub(crate) fn octaves(
@@ -143,6 +193,13 @@ mod tests {
         for i in 0..1000 {
             let (p, d) = (place(i), vec2(1e-3, 0.0));
             assert!((smooth(key, p + d) - smooth(key, p)).abs() < 1e-2);
+        }
+        for i in 0..1000 {
+            let (p, e) = (place(i) * 0.01, 1e-3);
+            let at = |d: Vec2| octaves(key, p + d, 1.0, 3, 0.5, 1e-4);
+            let told = octaves_slope(key, p, 1.0, 3, 0.5, 1e-4);
+            let found = vec2(at(vec2(e, 0.0)) - at(vec2(-e, 0.0)), at(vec2(0.0, e)) - at(vec2(0.0, -e)));
+            assert!((found / (2.0 * e) - told).length() < 0.02, "{found} {told}");
         }
         // Wave length 1, footprint 2: nothing is left but the mean.
         assert_eq!(octaves(key, place(1), 1.0, 4, 0.5, 2.0), 0.0);

@@ -99,14 +99,17 @@ fn plaster(draw: &mut Dice) -> Vec<Relief> {
 }
 
 fn asphalt(draw: &mut Dice) -> Vec<Relief> {
-    let size = draw.log(6e-3, 14e-3);
-    let stones = Stones {
-        size,
-        height: 0.12 * size,
-        tone: draw.between(0.4, 1.1),
-        dark: draw.between(0.2, 0.5),
+    let size = draw.log(3.5e-3, 9e-3);
+    let mut stones = |size: f32, share: f32| {
+        Relief::Stones(Stones {
+            size,
+            height: draw.between(0.03, 0.1) * size,
+            tone: share * draw.between(0.3, 1.0),
+            dark: share * draw.between(0.1, 0.35),
+        })
     };
-    vec![Relief::Stones(stones), rough(draw, 4e-3, 3, [0.2e-3, 0.5e-3], 0.15)]
+    let [coarse, fine] = [stones(size, 1.0), stones(0.37 * size, 0.8)];
+    vec![coarse, fine, rough(draw, 6e-3, 4, [0.3e-3, 0.9e-3], 0.2)]
 }
 
 fn brushed(draw: &mut Dice) -> Vec<Relief> {
@@ -181,15 +184,15 @@ fn base(kind: FinishKind, draw: &mut Dice) -> Base {
     match kind {
         FinishKind::Asphalt => tint *= draw.between(0.25, 0.6),
         FinishKind::Plaster if draw.chance(0.4) => {
-            tint *= Vec3::new(1.3, draw.between(1.0, 1.25), draw.between(0.7, 1.1));
+            tint *= Vec3::new(1.25, draw.between(1.08, 1.22), draw.between(0.75, 1.1));
         }
         _ => {}
     }
     Base {
         tint,
         blotch: draw.log(0.08, 0.6),
-        contrast: draw.between(0.08, 0.4),
-        grain: draw.between(0.06, 0.22),
+        contrast: draw.between(0.1, 0.5),
+        grain: draw.between(0.06, 0.25),
     }
 }
 
@@ -211,8 +214,11 @@ fn marks(kind: FinishKind, worn: f32, draw: &mut Dice) -> Vec<Mark> {
     if draw.chance(0.2 * worn) {
         marks.push(paint(kind, draw));
     }
-    if draw.chance(0.9 * worn) {
+    if draw.chance(0.4 + 0.6 * worn) {
         marks.push(damp(draw));
+    }
+    if draw.chance(0.3 + 0.7 * worn) {
+        marks.push(streaks(kind, draw));
     }
     if upright && draw.chance(0.85 * worn) {
         let cover = Cover {
@@ -243,8 +249,8 @@ fn marks(kind: FinishKind, worn: f32, draw: &mut Dice) -> Vec<Mark> {
 
 fn paint(kind: FinishKind, draw: &mut Dice) -> Mark {
     let bright = draw.between(0.3, 0.85);
-    let hue = Vec3::new(draw.between(0.5, 1.0), draw.between(0.5, 1.0), draw.between(0.4, 1.0));
-    let colour = if draw.chance(0.5) { Vec3::splat(bright) } else { bright * hue };
+    let hue = Vec3::new(draw.between(0.7, 1.0), draw.between(0.7, 1.0), draw.between(0.6, 1.0));
+    let colour = if draw.chance(0.7) { Vec3::splat(bright) } else { bright * hue };
     let road = matches!(kind, FinishKind::Asphalt | FinishKind::Brushed);
     Mark::Band(Band {
         period: if road { draw.between(0.6, 2.5) } else { draw.between(0.5, 3.0) },
@@ -267,6 +273,25 @@ fn damp(draw: &mut Dice) -> Mark {
         tall: draw.log(0.6, 5.0),
         from: draw.between(-0.15, 0.3),
         border: draw.log(0.05, 0.6),
+    })
+}
+
+/// Thin films of paste and dirt, drawn out along the form or down the wall.
+fn streaks(kind: FinishKind, draw: &mut Dice) -> Mark {
+    let pale = draw.chance(0.4);
+    let tint = if pale { draw.between(1.1, 1.35) } else { draw.between(0.55, 0.85) };
+    let upright = !matches!(kind, FinishKind::Asphalt | FinishKind::Brushed);
+    Mark::Patches(Patches {
+        cover: Cover {
+            matter: Matter::Dirt,
+            colour: Vec3::new(1.0, 0.99, 0.97) * tint,
+            replaces: false,
+            strength: draw.between(0.4, 1.0),
+        },
+        size: draw.log(0.01, 0.06),
+        tall: if upright { draw.log(3.0, 25.0) } else { draw.log(0.5, 2.0) },
+        from: draw.between(-0.3, 0.2),
+        border: draw.log(0.2, 0.8),
     })
 }
 
@@ -309,8 +334,8 @@ fn rust_patches(draw: &mut Dice) -> Mark {
         cover: iron(draw),
         size: draw.log(0.05, 0.3),
         tall: draw.log(0.6, 3.0),
-        from: draw.between(0.25, 0.45),
-        border: draw.log(0.08, 0.4),
+        from: draw.between(0.1, 0.35),
+        border: draw.log(0.25, 0.8),
     })
 }
 
@@ -319,8 +344,8 @@ fn salt_patches(draw: &mut Dice) -> Mark {
         cover: salt(),
         size: draw.log(0.05, 0.3),
         tall: draw.log(0.6, 3.0),
-        from: draw.between(0.25, 0.4),
-        border: draw.log(0.08, 0.4),
+        from: draw.between(0.1, 0.35),
+        border: draw.log(0.2, 0.8),
     })
 }
 

@@ -3,7 +3,7 @@
 use glam::{Vec2, vec2};
 use intrados_stage::random::Key;
 
-use super::noise::{bits, cell, octaves, scattered, smooth, step, unit, visible};
+use super::noise::{bits, cell, octaves, octaves_slope, scattered, smooth, step, unit, visible};
 
 /// One kind of relief.
 #[derive(Debug, Clone, PartialEq)]
@@ -126,6 +126,12 @@ impl Relief {
             Self::Rough(rough) => rough.height(other(key, 5), at, footprint),
             Self::Stones(stones) => stones.height(other(key, 6), at, footprint),
         }
+    }
+
+    /// Slope at a place where it is known without differences.
+    pub(super) fn slope(&self, key: Key, at: Vec2, footprint: f32) -> Option<Vec2> {
+        let Self::Rough(rough) = self else { return None };
+        Some(rough.slope(other(key, 5), at, footprint))
     }
 
     /// What the relief makes of the colour: a factor whose mean is about 1.
@@ -301,6 +307,14 @@ impl Holes {
 }
 
 impl Rough {
+    fn slope(&self, key: Key, at: Vec2, footprint: f32) -> Vec2 {
+        let longest = self.size.max_element();
+        let stretch = longest / self.size;
+        let at = at * stretch;
+        let slope = octaves_slope(key, at, longest, self.octaves, self.gain, footprint);
+        self.amplitude * stretch * slope
+    }
+
     fn height(&self, key: Key, at: Vec2, footprint: f32) -> f32 {
         let longest = self.size.max_element();
         let at = at * (longest / self.size);
@@ -334,7 +348,9 @@ impl Stones {
             return 1.0 - BETWEEN * self.dark;
         }
         let (border, stone) = self.stone(key, at);
-        let own = 1.0 + self.tone * (unit(key, stone, 3) - 0.5);
+        // Most stones are of one kind, a few are bright.
+        let u = unit(key, stone, 3);
+        let own = 1.0 + self.tone * (u * u * u * u - 0.2) * 2.0;
         let matrix = 1.0 - self.dark * (1.0 - step(0.02, 0.3, border));
         1.0 - BETWEEN * self.dark + seen * (own * matrix - 1.0 + BETWEEN * self.dark)
     }
