@@ -90,15 +90,22 @@ fn render(scene: Scene, camera: &Camera, samples: u64) -> Vec<f64> {
 /// far that only its floor is seen.
 #[test]
 fn a_slot_returns_what_radiosity_says() {
-    let (width, long) = (1e-3_f32, 0.5);
+    let (width, long) = (1e-3_f32, 0.1);
     for (depth, albedo) in [(0.5, 0.5), (2.0, 0.5), (2.0, 0.8), (6.0, 0.8)] {
         let (half, deep) = (0.5 * width, depth * width);
         let at = |x: f32, y: f32, z: f32| Vec3::new(x, y, z);
         let mut mesh = Mesh::default();
-        quad(&mut mesh, [at(-half, -deep, long), at(half, -deep, long), at(half, -deep, -long), at(-half, -deep, -long)]);
-        quad(&mut mesh, [at(-half, -deep, long), at(-half, -deep, -long), at(-half, 0.0, -long), at(-half, 0.0, long)]);
-        quad(&mut mesh, [at(half, -deep, -long), at(half, -deep, long), at(half, 0.0, long), at(half, 0.0, -long)]);
-        for (a, b) in [(-0.5, -half), (half, 0.5)] {
+        // In pieces twice as long as wide: walks start off a triangle by its rounding, which grows
+        // with its length over its height.
+        let pieces = (long / width) as i32;
+        for z in (-pieces / 2..pieces / 2).map(|k| 2.0 * width * k as f32) {
+            let end = z + 2.0 * width;
+            let low = -deep;
+            quad(&mut mesh, [at(-half, low, end), at(half, low, end), at(half, low, z), at(-half, low, z)]);
+            quad(&mut mesh, [at(-half, low, end), at(-half, low, z), at(-half, 0.0, z), at(-half, 0.0, end)]);
+            quad(&mut mesh, [at(half, low, z), at(half, low, end), at(half, 0.0, end), at(half, 0.0, z)]);
+        }
+        for (a, b) in [(-0.1, -half), (half, 0.1)] {
             quad(&mut mesh, [at(a, 0.0, long), at(b, 0.0, long), at(b, 0.0, -long), at(a, 0.0, -long)]);
         }
         let mut scene = Scene {

@@ -11,15 +11,13 @@ use glam::{DVec2, DVec3, Vec3, dvec2};
 use rayon::prelude::*;
 
 use super::{
-    cut::{Piece, Region, cut},
+    cut::{ON_EDGE, Piece, Region, cut},
     zone::Zone,
 };
 use crate::Mesh;
 
 /// Points nearer than this are one, m.
 const WELD: f64 = 1e-6;
-/// Corners of pieces so near an edge lie on it, m.
-const ON_EDGE: f64 = 2e-8;
 /// Points on an edge settle within so many rounds.
 const ROUNDS: usize = 6;
 /// Floors less deep than this are none, m.

@@ -12,6 +12,9 @@ use spade::{
 /// Coordinates are kept to a nanometre, so that what is meant to be one point is.
 const GRID: f64 = 1e9;
 
+/// Corners of pieces so near an edge of their triangle lie on it, m.
+pub(super) const ON_EDGE: f64 = 2e-8;
+
 /// A part of the plane that is cut out: which triangles make it up, what bounds it.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Region {
@@ -72,6 +75,14 @@ fn is_inside([a, b, c]: [DVec2; 3], p: DVec2) -> bool {
     let side = |a: DVec2, b: DVec2| (b - a).perp_dot(p - a);
     let (x, y, z) = (side(a, b), side(b, c), side(c, a));
     (x >= 0.0 && y >= 0.0 && z >= 0.0) || (x <= 0.0 && y <= 0.0 && z <= 0.0)
+}
+
+/// Whether rounding made a piece between an edge and the points on it.
+fn is_flat_on_edge(corners: [DVec2; 3], piece: [DVec2; 3]) -> bool {
+    (0..3).any(|k| {
+        let way = (corners[(k + 1) % 3] - corners[k]).normalize_or_zero();
+        piece.iter().all(|&p| way.perp_dot(p - corners[k]).abs() < ON_EDGE)
+    })
 }
 
 /// Distance of a place inside from the nearest edge, m.
@@ -141,7 +152,8 @@ pub(super) fn cut(
         let corners_of = face.vertices().map(|v| DVec2::new(v.position().x, v.position().y));
         let middle = corners_of.iter().sum::<DVec2>() / 3.0;
         let label = finder.label(middle);
-        is_inside(corners, middle).then_some(Piece { corners: corners_of, label })
+        let is_piece = is_inside(corners, middle) && !is_flat_on_edge(corners, corners_of);
+        is_piece.then_some(Piece { corners: corners_of, label })
     });
     inside.collect()
 }
