@@ -4,7 +4,10 @@
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "an example for people")]
 
 use glam::Vec3;
-use intrados_light::{Patch, tone::{Curve, Tone}};
+use intrados_light::{
+    Patch,
+    tone::{Curve, Tone},
+};
 use intrados_stage::{Job, cpu_seconds, random::Key};
 
 const COLUMNS: usize = 6;
@@ -23,8 +26,11 @@ fn main() {
         let key = Key::new(first + n as u64, 0);
         let before = cpu_seconds();
         let patch = Patch::render(key, size as u32, samples, &Job::default()).unwrap();
-        let widths: Vec<f32> =
-            patch.courses.iter().map(|c| c.iter().map(|p| p.width).fold(0.0, f32::max) * 1e3).collect();
+        let widths: Vec<f32> = patch
+            .courses
+            .iter()
+            .map(|c| c.iter().map(|p| p.width).fold(0.0, f32::max) * 1e3)
+            .collect();
         println!(
             "{}: {:.2} CPU-s, {:.2} mm a pixel, cracks {widths:.2?} mm",
             first + n as u64,
@@ -35,8 +41,15 @@ fn main() {
         for i in 0..size * size {
             let (x, y) = (left + i % size, top + i / size);
             let label = &patch.labels[i];
-            let told = Vec3::new(label.crack.max(label.rust), label.spall.max(0.6 * label.rust), label.efflorescence);
-            for (y, pixel) in [(y, tone.encode(patch.radiance[i])), (y + size, (told * 255.0).to_array().map(|v| v as u8))] {
+            let told = Vec3::new(
+                label.crack.max(label.rust),
+                label.spall.max(0.6 * label.rust),
+                label.efflorescence,
+            );
+            for (y, pixel) in [
+                (y, tone.encode(patch.radiance[i])),
+                (y + size, (told * 255.0).to_array().map(|v| v as u8)),
+            ] {
                 let at = 3 * (y * width + x);
                 sheet[at..at + 3].copy_from_slice(&pixel);
             }

@@ -8,8 +8,7 @@ use std::sync::Arc;
 use glam::{DVec2, Mat4, Vec3, dvec2};
 use intrados_light::{LitScene, Render, RenderSettings, Sides, View};
 use intrados_scene::{
-    Camera, CrackSurface, Lamp, LampKind, Material, Mesh, Mouth, Object, Part, Scene,
-    SurfaceDamage,
+    Camera, CrackSurface, Lamp, LampKind, Material, Mesh, Mouth, Object, Part, Scene, SurfaceDamage,
 };
 use intrados_stage::Job;
 
@@ -33,17 +32,21 @@ fn floor_by_radiosity(depth_over_width: f64, albedo: f64) -> f64 {
     }
     let mouth = [dvec2(0.0, 0.0), dvec2(1.0, 0.0)];
     let factor = |p: [DVec2; 2], q: [DVec2; 2]| {
-        let (a, b) = (p[0].distance(q[0]) + p[1].distance(q[1]), p[0].distance(q[1]) + p[1].distance(q[0]));
+        let (a, b) =
+            (p[0].distance(q[0]) + p[1].distance(q[1]), p[0].distance(q[1]) + p[1].distance(q[0]));
         0.5 * (a - b).abs() / p[0].distance(p[1])
     };
     let n = strips.len();
     let same_wall = |i: usize, j: usize| {
         let (a, b) = (strips[i], strips[j]);
-        (a[0].x == a[1].x && b[0].x == b[1].x && a[0].x == b[0].x) || (a[0].y == a[1].y && b[0].y == b[1].y)
+        (a[0].x == a[1].x && b[0].x == b[1].x && a[0].x == b[0].x)
+            || (a[0].y == a[1].y && b[0].y == b[1].y)
     };
     let factors: Vec<Vec<f64>> = (0..n)
         .map(|i| {
-            let to = |j: usize| if i == j || same_wall(i, j) { 0.0 } else { factor(strips[i], strips[j]) };
+            let to = |j: usize| {
+                if i == j || same_wall(i, j) { 0.0 } else { factor(strips[i], strips[j]) }
+            };
             (0..n).map(to).collect()
         })
         .collect();
@@ -101,12 +104,24 @@ fn a_slot_returns_what_radiosity_says() {
         for z in (-pieces / 2..pieces / 2).map(|k| 2.0 * width * k as f32) {
             let end = z + 2.0 * width;
             let low = -deep;
-            quad(&mut mesh, [at(-half, low, end), at(half, low, end), at(half, low, z), at(-half, low, z)]);
-            quad(&mut mesh, [at(-half, low, end), at(-half, low, z), at(-half, 0.0, z), at(-half, 0.0, end)]);
-            quad(&mut mesh, [at(half, low, z), at(half, low, end), at(half, 0.0, end), at(half, 0.0, z)]);
+            quad(
+                &mut mesh,
+                [at(-half, low, end), at(half, low, end), at(half, low, z), at(-half, low, z)],
+            );
+            quad(
+                &mut mesh,
+                [at(-half, low, end), at(-half, low, z), at(-half, 0.0, z), at(-half, 0.0, end)],
+            );
+            quad(
+                &mut mesh,
+                [at(half, low, z), at(half, low, end), at(half, 0.0, end), at(half, 0.0, z)],
+            );
         }
         for (a, b) in [(-0.1, -half), (half, 0.1)] {
-            quad(&mut mesh, [at(a, 0.0, long), at(b, 0.0, long), at(b, 0.0, -long), at(a, 0.0, -long)]);
+            quad(
+                &mut mesh,
+                [at(a, 0.0, long), at(b, 0.0, long), at(b, 0.0, -long), at(a, 0.0, -long)],
+            );
         }
         let mut scene = Scene {
             materials: vec![Material { base_colour: Vec3::splat(albedo), ..Material::default() }],
@@ -191,11 +206,13 @@ fn the_light_missing_across_a_crack_does_not_depend_on_the_distance() {
         let rows = rows as usize;
         let profile: Vec<f64> = (0..rows).map(row_mean).collect();
         // The face itself from the quarter at the top and the bottom.
-        let edge: Vec<f64> = profile[..rows / 4].iter().chain(&profile[rows - rows / 4..]).copied().collect();
+        let edge: Vec<f64> =
+            profile[..rows / 4].iter().chain(&profile[rows - rows / 4..]).copied().collect();
         let face = edge.iter().sum::<f64>() / edge.len() as f64;
         let missing: f64 = profile.iter().map(|y| 1.0 - y / face).sum::<f64>() * f64::from(pixel);
         let spread = edge.iter().map(|v| (v / face - 1.0).powi(2)).sum::<f64>() / edge.len() as f64;
-        let error = (spread * rows as f64 * (1.0 + rows as f64 / edge.len() as f64)).sqrt() * f64::from(pixel);
+        let error = (spread * rows as f64 * (1.0 + rows as f64 / edge.len() as f64)).sqrt()
+            * f64::from(pixel);
         // Per metre of picture → per metre of crack.
         let share = f64::from(columns * pixel / (right - left));
         found.push([missing * share, error * share]);

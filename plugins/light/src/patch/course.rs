@@ -4,14 +4,14 @@ use glam::{Vec2, Vec3};
 use intrados_scene::{CrackSurface, Mouth};
 use intrados_stage::random::{Draw, Key};
 
-/// Told so closely that nothing is added between, m.
-const STEP: f32 = 4e-3;
 /// The narrowest place of a crack over its width.
 const LEAST: f32 = 0.03;
 
 /// What grows.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Seed {
+    /// Told so closely that nothing is added between, below 9 mm.
+    pub(super) step: f32,
     /// On the face, m.
     pub(super) at: Vec2,
     /// rad from +x.
@@ -34,11 +34,11 @@ pub(super) fn grow(seed: Seed, key: Key) -> Vec<CrackSurface> {
     let mut waiting = vec![(seed, 0_u32)];
     while let Some((seed, generation)) = waiting.pop() {
         let mut draw = Draw::new(key.split(generation, all.len() as u32));
-        let steps = ((seed.length / STEP) as usize).clamp(4, 1500);
+        let steps = ((seed.length / seed.step) as usize).clamp(4, 1500);
         let step = seed.length / steps as f32;
         let (mut at, mut way) = (seed.at, seed.way);
         // Slow and quick changes of direction; the slow ones pull back to the course.
-        let mut slow = 0.0_f32;
+        let (mut slow, mut kink) = (0.0_f32, 0.0_f32);
         let mut swell = Swell::new(&mut draw);
         let mut mouth = Vec::with_capacity(steps + 1);
         for i in 0..=steps {
@@ -55,7 +55,7 @@ pub(super) fn grow(seed: Seed, key: Key) -> Vec<CrackSurface> {
                 let side = if draw.chance(0.5) { 1.0 } else { -1.0 };
                 let aside = side * draw.between(0.3, 1.2) as f32;
                 let length = seed.length * (1.0 - s) * draw.between(0.3, 0.9) as f32;
-                if length > 6.0 * STEP && all.len() + waiting.len() < 8 {
+                if length > 6.0 * seed.step && all.len() + waiting.len() < 8 {
                     let width = seed.width * draw.between(0.3, 0.8) as f32;
                     let fork = Seed { at, way: way + aside, length, width, free: false, ..seed };
                     waiting.push((fork, generation + 1));
@@ -64,7 +64,10 @@ pub(super) fn grow(seed: Seed, key: Key) -> Vec<CrackSurface> {
             let noise = draw.normal() as f32 * seed.unrest * step.sqrt();
             slow = 0.97 * slow + noise;
             way += noise + 0.05 * (seed.way - way);
-            let kink = if draw.chance(0.06) { draw.normal() as f32 * 0.5 } else { 0.0 };
+            // Round a stone, and back to the course.
+            if draw.chance(0.2) {
+                kink = draw.normal() as f32 * 0.55;
+            }
             let now = way + slow * 0.4 + kink;
             at += step * Vec2::new(now.cos(), now.sin());
         }
@@ -92,8 +95,7 @@ impl Swell {
         self.left -= step;
         if self.left <= 0.0 {
             self.left = draw.log_between(0.01, 0.12) as f32;
-            self.target =
-                if draw.chance(0.15) { 0.05 } else { draw.log_between(0.4, 1.3) as f32 };
+            self.target = if draw.chance(0.15) { 0.05 } else { draw.log_between(0.4, 1.3) as f32 };
         }
         self.level += (self.target - self.level) * (step / 0.012).min(1.0);
         self.level

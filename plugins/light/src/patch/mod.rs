@@ -124,7 +124,8 @@ impl What {
 
 fn labels(lit: &LitScene, camera: &Camera) -> Vec<Label> {
     let what: Vec<What> = lit.scene.objects.iter().map(|o| What::of(&o.name)).collect();
-    let stained = lit.scene.materials.iter().any(|m| m.finish.as_ref().is_some_and(|f| f.is_stained()));
+    let stained =
+        lit.scene.materials.iter().any(|m| m.finish.as_ref().is_some_and(|f| f.is_stained()));
     let mut scratch = Scratch::default();
     let mut labels = Vec::with_capacity((camera.width * camera.height) as usize);
     for y in 0..camera.height {
@@ -170,10 +171,8 @@ fn labels(lit: &LitScene, camera: &Camera) -> Vec<Label> {
 fn seen(lit: &LitScene, camera: &Camera, line: &[(Vec3, f32)]) -> Vec<CoursePoint> {
     let [right, up, forward] = camera.frame();
     let [hx, hy] = camera.half_extent();
-    let rays: Vec<Ray> = line
-        .iter()
-        .map(|&(p, _)| Ray::new(camera.position, p - camera.position, 0.998))
-        .collect();
+    let rays: Vec<Ray> =
+        line.iter().map(|&(p, _)| Ray::new(camera.position, p - camera.position, 0.998)).collect();
     let mut hidden = vec![false; rays.len()];
     lit.tracer.any(&rays, &mut hidden, &mut Scratch::default());
     let project = |p: Vec3| {
@@ -229,7 +228,10 @@ mod tests {
             for p in points().filter(wide) {
                 let near = |x: i32, y: i32| {
                     let at = [p.at.x as i32 + x, p.at.y as i32 + y];
-                    patch.labels.get((at[1] * 64 + at[0]) as usize).is_some_and(|l| l.crack + l.spall > 0.0)
+                    patch
+                        .labels
+                        .get((at[1] * 64 + at[0]) as usize)
+                        .is_some_and(|l| l.crack + l.spall > 0.0)
                 };
                 assert!((-1..=1).any(|x| (-1..=1).any(|y| near(x, y))), "seed {seed}: {p:?}");
                 passed += 1;

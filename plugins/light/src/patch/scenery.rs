@@ -42,10 +42,8 @@ pub(super) fn draw(key: Key, size: u32) -> Drawn {
     let spalls = builder.spalls();
     builder.before();
     builder.light();
-    let courses = cracks
-        .iter()
-        .map(|crack| crack.mouth.iter().map(|m| (m.at, m.width)).collect())
-        .collect();
+    let courses =
+        cracks.iter().map(|crack| crack.mouth.iter().map(|m| (m.at, m.width)).collect()).collect();
     let damage = SurfaceDamage { member: "face".into(), cracks, spalls };
     let mut scene = builder.scene;
     scene.cameras.push(camera.clone());
@@ -89,7 +87,8 @@ impl Builder {
         let tilt = 0.6 * self.draw.unit().powi(2) as f32;
         let turn = self.between(0.0, 2.0 * PI);
         let way = Vec3::new(tilt.sin() * turn.cos(), tilt.sin() * turn.sin(), tilt.cos());
-        let roll = if self.draw.chance(0.3) { self.between(-PI, PI) } else { self.between(-0.1, 0.1) };
+        let roll =
+            if self.draw.chance(0.3) { self.between(-PI, PI) } else { self.between(-0.1, 0.1) };
         Camera {
             name: "patch".into(),
             position: distance * way,
@@ -178,6 +177,7 @@ impl Builder {
             let widest = if self.draw.chance(0.15) { 14.0 } else { 4.0 };
             let pixels = self.log(0.25, widest);
             let seed = Seed {
+                step: (2.0 * pixel).min(4e-3),
                 at: self.somewhere(1.3),
                 way: self.between(0.0, 2.0 * PI),
                 length: self.log(0.3, 2.5) * self.side,
@@ -276,10 +276,9 @@ impl Builder {
         let glancing = self.draw.chance(0.5);
         let height = if glancing { self.between(0.06, 0.4) } else { self.between(0.4, 1.4) };
         let turn = self.between(-0.3, PI + 0.3);
-        let from =
-            Vec3::new(height.cos() * turn.cos(), height.cos() * turn.sin(), height.sin());
-        let sky = Vec3::new(0.85, 0.95, 1.15);
-        let warm = Vec3::new(1.08, 1.0, 0.9);
+        let from = Vec3::new(height.cos() * turn.cos(), height.cos() * turn.sin(), height.sin());
+        let sky = Vec3::new(0.94, 0.98, 1.06);
+        let warm = Vec3::new(1.03, 1.0, 0.95);
         match self.draw.count(0, 9) {
             0..=3 => {
                 let strength = self.log(2.0, 12.0);
@@ -293,7 +292,10 @@ impl Builder {
             _ => {
                 let distance = self.log(0.7, 4.0) * self.side.max(0.4);
                 let strength = 12.0 * distance * distance;
-                self.lamp(LampKind::Point { position: from * distance, intensity: warm * strength });
+                self.lamp(LampKind::Point {
+                    position: from * distance,
+                    intensity: warm * strength,
+                });
                 let rest = self.log(0.05, 0.8);
                 self.lamp(LampKind::Environment { radiance: sky * rest, image: None });
             }
@@ -320,20 +322,11 @@ impl Builder {
 }
 
 fn plain(colour: Vec3) -> Material {
-    Material {
-        name: "plain".into(),
-        assumed: false,
-        base_colour: colour,
-        ..Material::default()
-    }
+    Material { name: "plain".into(), assumed: false, base_colour: colour, ..Material::default() }
 }
 
 fn quad(corners: [Vec3; 4]) -> Mesh {
-    Mesh {
-        positions: corners.to_vec(),
-        triangles: vec![[0, 1, 2], [0, 2, 3]],
-        ..Mesh::default()
-    }
+    Mesh { positions: corners.to_vec(), triangles: vec![[0, 1, 2], [0, 2, 3]], ..Mesh::default() }
 }
 
 /// A ring of points about an axis; returns the index of the first.

@@ -319,7 +319,9 @@ fn append(mesh: &mut Mesh, of: usize, positions: [Vec3; 3], weights: [[f32; 3]; 
     mesh.positions.extend(positions);
     for w in weights {
         if !mesh.normals.is_empty() {
-            let n = mesh.normals[old[0]] * w[0] + mesh.normals[old[1]] * w[1] + mesh.normals[old[2]] * w[2];
+            let n = mesh.normals[old[0]] * w[0]
+                + mesh.normals[old[1]] * w[1]
+                + mesh.normals[old[2]] * w[2];
             mesh.normals.push(n.normalize_or(mesh.normals[old[0]]));
         }
         if !mesh.tangents.is_empty() {
@@ -378,7 +380,8 @@ fn floors_and_walls(facets: &[Facet], points: &[DVec3], zones: &[Zone], carved: 
             if beyond.is_some_and(|other| kind(other) == kind(label) || other < label) {
                 continue;
             }
-            let (low, high) = ([a, b].map(|c| floor(c, Some(label))), [a, b].map(|c| floor(c, beyond)));
+            let (low, high) =
+                ([a, b].map(|c| floor(c, Some(label))), [a, b].map(|c| floor(c, beyond)));
             let apart = |k: usize| low[k] != high[k];
             match (apart(0), apart(1)) {
                 (true, true) => {

@@ -38,11 +38,8 @@ pub(super) struct Station {
 /// The mouth's line in pieces, wandering between the points where it was told. Wandering is a share
 /// of what lies between these points: a line that is told closely is left alone.
 pub(super) fn stations(crack: &CrackSurface, widening: f32, key: Key) -> Vec<Station> {
-    let told: Vec<f64> = crack
-        .mouth
-        .windows(2)
-        .map(|pair| f64::from(pair[0].at.distance(pair[1].at)))
-        .collect();
+    let told: Vec<f64> =
+        crack.mouth.windows(2).map(|pair| f64::from(pair[0].at.distance(pair[1].at))).collect();
     let length: f64 = told.iter().sum();
     let piece = PIECE.max(length / MOST_PIECES) as f32;
     let mut line: Vec<Station> = Vec::new();
@@ -108,7 +105,8 @@ pub(super) fn ribs(line: &[Station], depth: f32, key: Key) -> Vec<Rib> {
                 let chipped = 1.0 + 0.45 * smooth(key, vec2(station.along / 4e-3, row));
                 at + side * 0.5 * f64::from(station.width * chipped) * across
             };
-            let lips = if i == 0 || i == last { [at; 2] } else { [lip(-1.0, 20.5), lip(1.0, 30.5)] };
+            let lips =
+                if i == 0 || i == last { [at; 2] } else { [lip(-1.0, 20.5), lip(1.0, 30.5)] };
             let share = step(0.0, 0.5, station.width / widest);
             Rib { at, lips, outward, depth: f64::from(depth * (0.05 + 0.95 * share)) }
         })

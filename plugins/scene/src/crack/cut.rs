@@ -119,11 +119,8 @@ pub(super) fn cut(
         let (from, to) = (corners[k], corners[(k + 1) % 3]);
         let mut on: Vec<DVec2> = edges[k].clone();
         on.sort_by(|a, b| a.distance_squared(from).total_cmp(&b.distance_squared(from)));
-        let chain: Option<Vec<_>> = std::iter::once(from)
-            .chain(on)
-            .chain([to])
-            .map(|p| put(&mut net, p))
-            .collect();
+        let chain: Option<Vec<_>> =
+            std::iter::once(from).chain(on).chain([to]).map(|p| put(&mut net, p)).collect();
         let Some(chain) = chain else { return whole() };
         segments.extend(chain.windows(2).map(|pair| [pair[0], pair[1]]));
     }

@@ -158,9 +158,8 @@ struct Surface(Tracer);
 
 impl Surface {
     fn of(meshes: &[Mesh]) -> Self {
-        let corners = |mesh: &Mesh| {
-            (0..mesh.triangles.len()).map(|t| mesh.corners(t)).collect::<Vec<_>>()
-        };
+        let corners =
+            |mesh: &Mesh| (0..mesh.triangles.len()).map(|t| mesh.corners(t)).collect::<Vec<_>>();
         Self(Tracer::build(&meshes.iter().flat_map(corners).collect::<Vec<_>>()))
     }
 
@@ -501,7 +500,13 @@ mod tests {
         let scene = column();
         let (z, low, high) = front(&scene);
         let across = |from: f32, to: f32, y: f32| {
-            crack(vec![at(Vec3::new(from, y, z), Vec3::Z, 2e-3), at(Vec3::new(to, y, z), Vec3::Z, 2e-3)], 0.03)
+            crack(
+                vec![
+                    at(Vec3::new(from, y, z), Vec3::Z, 2e-3),
+                    at(Vec3::new(to, y, z), Vec3::Z, 2e-3),
+                ],
+                0.03,
+            )
         };
         // Runs out over an arris, ends on it, turns round it, lies in the air.
         let over = across(low.x + 0.1, high.x + 0.2, 1.0);

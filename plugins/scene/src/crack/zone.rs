@@ -120,10 +120,9 @@ impl Zone {
     /// The triangles that make it up.
     pub(super) fn triangles(&self) -> Vec<[DVec3; 3]> {
         match self {
-            Self::Slot([a, b]) => vec![
-                [a.lips[0], b.lips[0], b.lips[1]],
-                [a.lips[0], b.lips[1], a.lips[1]],
-            ],
+            Self::Slot([a, b]) => {
+                vec![[a.lips[0], b.lips[0], b.lips[1]], [a.lips[0], b.lips[1], a.lips[1]]]
+            }
             Self::Bowl(bowl) => (0..ROUND)
                 .map(|k| [bowl.centre, bowl.corner(k), bowl.corner((k + 1) % ROUND)])
                 .collect(),

@@ -23,9 +23,7 @@ use serde::{Deserialize, Serialize};
 pub use unwrap::{Place, Unwrap};
 
 /// What a face was made against, or is covered with.
-#[derive(
-    Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, JsonSchema,
-)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, JsonSchema)]
 pub enum FinishKind {
     /// Sawn boards.
     #[default]
@@ -113,9 +111,10 @@ impl Finish {
                 })
             })
             .sum::<Vec2>();
-        let shade = self.reliefs.iter().fold(1.0, |tone, relief| {
-            tone * relief.tone(self.key, at, footprint)
-        });
+        let shade = self
+            .reliefs
+            .iter()
+            .fold(1.0, |tone, relief| tone * relief.tone(self.key, at, footprint));
         let colour = self.base.colour(self.key, at, footprint, colour) * shade;
         let mut seen = tone::Seen { colour, rust: 0.0, efflorescence: 0.0 };
         for mark in &self.marks {
@@ -139,10 +138,10 @@ mod tests {
     use super::*;
 
     fn mean(finish: &Finish, footprint: f32) -> (Vec3, f32) {
-        let n = 40_000;
+        let n = 100_000;
         let (mut colour, mut slope) = (Vec3::ZERO, 0.0);
         for i in 0..n {
-            let at = Vec2::from(Key::new(1, i).pair(0)) * 20.0;
+            let at = Vec2::from(Key::new(1, i).pair(0)) * 60.0;
             let seen = finish.at(at, footprint, Vec3::splat(0.4));
             colour += seen.colour / n as f32;
             slope += seen.slope.length() / n as f32;

@@ -5,6 +5,7 @@
 
 use glam::{Vec2, vec2};
 use intrados_stage::random::Key;
+use wide::u32x4;
 
 /// Random bits of a cell of a grid.
 #[inline]
@@ -41,43 +42,56 @@ pub(super) fn visible(size: f32, footprint: f32) -> f32 {
     step(1.0, 3.0, size / footprint.max(1e-9))
 }
 
+/// Random bits of the four corners of a cell: [`bits`] of (i, j), (i + 1, j), (i, j + 1),
+/// (i + 1, j + 1), dimension 0.
+#[inline]
+fn corners(key: Key, [i, j]: [i32; 2]) -> [u32; 4] {
+    let four = u32x4::splat;
+    let (i, j) = (i as u32, j as u32);
+    let rows = u32x4::new([i, i.wrapping_add(1), i, i.wrapping_add(1)]) * four(0x9e37_79b1);
+    let columns = u32x4::new([j, j, j.wrapping_add(1), j.wrapping_add(1)]) * four(0x85eb_ca6b);
+    let lowbias = |x: u32x4| {
+        let x = (x ^ (x >> 16_u32)) * four(0x7feb_352d);
+        let x = (x ^ (x >> 15_u32)) * four(0x846c_a68b);
+        x ^ (x >> 16_u32)
+    };
+    lowbias(lowbias(rows ^ four(key.0)) ^ (columns + four(key.1))).to_array()
+}
+
+/// A gradient's part in the noise, and the gradient.
+#[inline]
+fn pull(h: u32, from: Vec2) -> (f32, Vec2) {
+    let signed = |h: u32| (h & 0xffff) as f32 * (1.0 / 32_768.0) - 1.0;
+    let gradient = vec2(signed(h), signed(h >> 16));
+    (gradient.dot(from), gradient)
+}
+
 /// Gradient noise (Perlin 1985, with the quintic of 2002) on a unit grid: mean 0, within [−1, 1],
 /// root mean square about .3.
 #[inline]
 pub(crate) fn smooth(key: Key, p: Vec2) -> f32 {
-    let ([i, j], f) = cell(p);
-    let corner = |di: i32, dj: i32| {
-        let h = bits(key, [i.wrapping_add(di), j.wrapping_add(dj)], 0);
-        let signed = |h: u32| (h & 0xffff) as f32 * (1.0 / 32_768.0) - 1.0;
-        vec2(signed(h), signed(h >> 16)).dot(f - vec2(di as f32, dj as f32))
-    };
+    let (of, f) = cell(p);
+    let [a, b, c, d] = corners(key, of);
     let fade = f * f * f * (f * (f * 6.0 - 15.0) + 10.0);
-    let along = |dj: i32| {
-        let (a, b) = (corner(0, dj), corner(1, dj));
-        a + (b - a) * fade.x
-    };
-    let (a, b) = (along(0), along(1));
-    a + (b - a) * fade.y
+    let (a, b) = (pull(a, f).0, pull(b, f - Vec2::X).0);
+    let (c, d) = (pull(c, f - Vec2::Y).0, pull(d, f - Vec2::ONE).0);
+    let (low, high) = (a + (b - a) * fade.x, c + (d - c) * fade.x);
+    low + (high - low) * fade.y
 }
 
 /// [`smooth`] with its slope.
 #[inline]
 fn smooth_slope(key: Key, p: Vec2) -> (f32, Vec2) {
-    let ([i, j], f) = cell(p);
-    let corner = |di: i32, dj: i32| {
-        let h = bits(key, [i.wrapping_add(di), j.wrapping_add(dj)], 0);
-        let signed = |h: u32| (h & 0xffff) as f32 * (1.0 / 32_768.0) - 1.0;
-        let g = vec2(signed(h), signed(h >> 16));
-        (g.dot(f - vec2(di as f32, dj as f32)), g)
-    };
+    let (of, f) = cell(p);
+    let [a, b, c, d] = corners(key, of);
     let fade = f * f * f * (f * (f * 6.0 - 15.0) + 10.0);
     let steep = 30.0 * f * f * (f * (f - 2.0) + 1.0);
-    let along = |dj: i32| {
-        let ((a, da), (b, db)) = (corner(0, dj), corner(1, dj));
+    let along = |(a, da): (f32, Vec2), (b, db): (f32, Vec2)| {
         let slope = da + (db - da) * fade.x + vec2((b - a) * steep.x, 0.0);
         (a + (b - a) * fade.x, slope)
     };
-    let ((a, da), (b, db)) = (along(0), along(1));
+    let (a, da) = along(pull(a, f), pull(b, f - Vec2::X));
+    let (b, db) = along(pull(c, f - Vec2::Y), pull(d, f - Vec2::ONE));
     (a + (b - a) * fade.y, da + (db - da) * fade.y + vec2(0.0, (b - a) * steep.y))
 }
 
@@ -97,13 +111,16 @@ pub(super) fn octaves_slope(
             break;
         }
         let key = Key(key.0.wrapping_add(octave), key.1);
-        sum += seen * strength * scale * if octave % 2 == 0 {
-            smooth_slope(key, p * scale).1
-        } else {
-            let turned = vec2(0.8 * p.x - 0.6 * p.y, 0.6 * p.x + 0.8 * p.y);
-            let slope = smooth_slope(key, turned * scale).1;
-            vec2(0.8 * slope.x + 0.6 * slope.y, 0.8 * slope.y - 0.6 * slope.x)
-        };
+        sum += seen
+            * strength
+            * scale
+            * if octave % 2 == 0 {
+                smooth_slope(key, p * scale).1
+            } else {
+                let turned = vec2(0.8 * p.x - 0.6 * p.y, 0.6 * p.x + 0.8 * p.y);
+                let slope = smooth_slope(key, turned * scale).1;
+                vec2(0.8 * slope.x + 0.6 * slope.y, 0.8 * slope.y - 0.6 * slope.x)
+            };
         scale *= 2.0;
         strength *= gain;
     }
@@ -112,14 +129,7 @@ pub(super) fn octaves_slope(
 
 /// Octaves of noise from wave length `size` (m) downward, each half as long and `gain` as strong;
 /// those finer than the footprint are left out. Root mean square about .35.
-pub(crate) fn octaves(
-    key: Key,
-    p: Vec2,
-    size: f32,
-    count: u32,
-    gain: f32,
-    footprint: f32,
-) -> f32 {
+pub(crate) fn octaves(key: Key, p: Vec2, size: f32, count: u32, gain: f32, footprint: f32) -> f32 {
     octaves_and_rest(key, p, size, count, gain, footprint)[0]
 }
 
@@ -190,6 +200,11 @@ mod tests {
         // Places are independent but for the 300² cells: 5 standard errors.
         assert!(mean.abs() < 5.0 * (square / 90_000.0).sqrt(), "{mean}");
         assert!((0.2..0.5).contains(&square.sqrt()), "{}", square.sqrt());
+        for i in 0..1000_i32 {
+            let [a, b, c, d] = corners(key, [i, -i]);
+            let one = |di: i32, dj: i32| bits(key, [i + di, dj - i], 0);
+            assert_eq!([a, b, c, d], [one(0, 0), one(1, 0), one(0, 1), one(1, 1)]);
+        }
         for i in 0..1000 {
             let (p, d) = (place(i), vec2(1e-3, 0.0));
             assert!((smooth(key, p + d) - smooth(key, p)).abs() < 1e-2);
@@ -198,7 +213,8 @@ mod tests {
             let (p, e) = (place(i) * 0.01, 1e-3);
             let at = |d: Vec2| octaves(key, p + d, 1.0, 3, 0.5, 1e-4);
             let told = octaves_slope(key, p, 1.0, 3, 0.5, 1e-4);
-            let found = vec2(at(vec2(e, 0.0)) - at(vec2(-e, 0.0)), at(vec2(0.0, e)) - at(vec2(0.0, -e)));
+            let found =
+                vec2(at(vec2(e, 0.0)) - at(vec2(-e, 0.0)), at(vec2(0.0, e)) - at(vec2(0.0, -e)));
             assert!((found / (2.0 * e) - told).length() < 0.02, "{found} {told}");
         }
         // Wave length 1, footprint 2: nothing is left but the mean.

@@ -18,7 +18,9 @@ impl Finish {
         let reliefs = match kind {
             FinishKind::Board => boards(&mut draw),
             FinishKind::Panel => panels(&mut draw),
-            FinishKind::Shotcrete => vec![rough(&mut draw, 0.09, 5, [2e-3, 5e-3], 0.12), sand(&mut draw)],
+            FinishKind::Shotcrete => {
+                vec![rough(&mut draw, 0.09, 5, [2e-3, 5e-3], 0.12), sand(&mut draw)]
+            }
             FinishKind::Plaster => plaster(&mut draw),
             FinishKind::Asphalt => asphalt(&mut draw),
             FinishKind::Brushed => brushed(&mut draw),
@@ -38,7 +40,14 @@ impl Finish {
         }
         if rust {
             self.marks.push(rust_patches(&mut draw));
-            self.marks.push(runs(&mut draw, iron(&mut Dice(Draw::new(self.key))), 0.22, 0.03, 0.7, 0.5));
+            self.marks.push(runs(
+                &mut draw,
+                iron(&mut Dice(Draw::new(self.key))),
+                0.22,
+                0.03,
+                0.7,
+                0.5,
+            ));
         }
         self
     }
@@ -104,8 +113,8 @@ fn asphalt(draw: &mut Dice) -> Vec<Relief> {
         Relief::Stones(Stones {
             size,
             height: draw.between(0.03, 0.1) * size,
-            tone: share * draw.between(0.3, 1.0),
-            dark: share * draw.between(0.1, 0.35),
+            tone: share * draw.between(0.3, 1.1),
+            dark: share * draw.between(0.1, 0.3),
         })
     };
     let [coarse, fine] = [stones(size, 1.0), stones(0.37 * size, 0.8)];
@@ -118,7 +127,7 @@ fn brushed(draw: &mut Dice) -> Vec<Relief> {
         size: if draw.chance(0.5) { vec2(60.0 * pitch, pitch) } else { vec2(pitch, 60.0 * pitch) },
         octaves: 3,
         gain: 0.6,
-        amplitude: draw.between(0.05, 0.15) * pitch,
+        amplitude: draw.log(0.02, 0.08) * pitch,
         dark: 0.1,
     };
     let mut reliefs = vec![Relief::Rough(lines), sand(draw)];
@@ -342,21 +351,14 @@ fn rust_patches(draw: &mut Dice) -> Mark {
 fn salt_patches(draw: &mut Dice) -> Mark {
     Mark::Patches(Patches {
         cover: salt(),
-        size: draw.log(0.05, 0.3),
-        tall: draw.log(0.6, 3.0),
+        size: draw.log(0.02, 0.12),
+        tall: draw.log(1.0, 6.0),
         from: draw.between(0.1, 0.35),
-        border: draw.log(0.2, 0.8),
+        border: draw.log(0.4, 1.2),
     })
 }
 
-fn runs(
-    draw: &mut Dice,
-    cover: Cover,
-    spacing: f32,
-    width: f32,
-    length: f32,
-    share: f32,
-) -> Mark {
+fn runs(draw: &mut Dice, cover: Cover, spacing: f32, width: f32, length: f32, share: f32) -> Mark {
     let scale = draw.log(0.6, 1.6);
     Mark::Runs(Runs {
         cover,

@@ -175,7 +175,9 @@ impl Boards {
         };
         // A step is a slope over some footprints where it would be none at all.
         let soft = step(0.0, 2.0 * footprint.max(1e-3), edge);
-        (raised + tilt) * soft + fin + self.grain * self.grain_at(key, board, across, along, footprint)
+        (raised + tilt) * soft
+            + fin
+            + self.grain * self.grain_at(key, board, across, along, footprint)
     }
 
     /// Years of the wood: stretched noise that a slow wave bends, with here and there a knot.
@@ -198,7 +200,11 @@ impl Boards {
     fn leak(&self, key: Key, at: Vec2, board: [i32; 2]) -> f32 {
         let along = if self.lying { at.x } else { at.y };
         let key = Key(key.0 ^ bits(key, board, 12), key.1);
-        step(-0.3, 0.4, smooth(key, vec2(along / 0.09, 0.5)) + 0.5 * smooth(key, vec2(along / 0.02, 1.5)))
+        step(
+            -0.3,
+            0.4,
+            smooth(key, vec2(along / 0.09, 0.5)) + 0.5 * smooth(key, vec2(along / 0.02, 1.5)),
+        )
     }
 
     fn tone(&self, key: Key, at: Vec2, footprint: f32) -> f32 {
@@ -322,7 +328,7 @@ impl Rough {
     }
 }
 
-/// Share of a paving's face that is matrix.
+/// Share of a face of stones that is matrix.
 const BETWEEN: f32 = 0.42;
 
 impl Stones {
@@ -350,7 +356,7 @@ impl Stones {
         let (border, stone) = self.stone(key, at);
         // Most stones are of one kind, a few are bright.
         let u = unit(key, stone, 3);
-        let own = 1.0 + self.tone * (u * u * u * u - 0.2) * 2.0;
+        let own = 1.0 + self.tone * (u * u * u * u - 0.2);
         let matrix = 1.0 - self.dark * (1.0 - step(0.02, 0.3, border));
         1.0 - BETWEEN * self.dark + seen * (own * matrix - 1.0 + BETWEEN * self.dark)
     }

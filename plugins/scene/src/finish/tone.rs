@@ -145,7 +145,8 @@ impl Seen {
         match cover.matter {
             Matter::Dirt if !cover.replaces => {
                 // Darkened, not hidden.
-                (self.rust, self.efflorescence) = (self.rust / kept.max(1e-3), self.efflorescence / kept.max(1e-3));
+                (self.rust, self.efflorescence) =
+                    (self.rust / kept.max(1e-3), self.efflorescence / kept.max(1e-3));
             }
             Matter::Dirt => {}
             Matter::Rust => self.rust += share,
@@ -192,7 +193,8 @@ impl Mark {
 
 /// A number of a mark's own, so that two marks of a kind lie elsewhere.
 fn own(key: Key, number: u32, colour: Vec3, size: f32) -> Key {
-    let salt = colour.x.to_bits() ^ colour.z.to_bits().rotate_left(9) ^ size.to_bits().rotate_left(17);
+    let salt =
+        colour.x.to_bits() ^ colour.z.to_bits().rotate_left(9) ^ size.to_bits().rotate_left(17);
     Key(key.0 ^ salt, key.1.wrapping_add(number))
 }
 
@@ -236,7 +238,8 @@ impl Runs {
             if off > 1.6 {
                 continue;
             }
-            let streaks = 0.75 + 0.7 * smooth(key, vec2(at.x / (0.12 * width), at.y / (4.0 * width)));
+            let streaks =
+                0.75 + 0.7 * smooth(key, vec2(at.x / (0.12 * width), at.y / (4.0 * width)));
             let share = step(1.5, 0.3, off) * (1.0 - fall) * step(-0.02, 0.01, fall);
             seen.cover(&self.cover, share * streaks.clamp(0.0, 1.0));
         }
@@ -246,7 +249,8 @@ impl Runs {
 impl Lifts {
     fn lay(&self, key: Key, at: Vec2, footprint: f32, seen: &mut Seen) {
         let key = own(key, 70, Vec3::ZERO, self.height);
-        let wave = 0.02 * smooth(key, vec2(at.x / 0.6, 0.5)) + 0.006 * smooth(key, vec2(at.x / 0.08, 1.5));
+        let wave =
+            0.02 * smooth(key, vec2(at.x / 0.6, 0.5)) + 0.006 * smooth(key, vec2(at.x / 0.08, 1.5));
         let part = (at.y + wave) / self.height;
         let lift = part.floor();
         let tone = 1.0 + self.contrast * (unit(key, [lift as i32, 0], 1) - 0.5);
@@ -290,7 +294,8 @@ impl Strokes {
             return;
         }
         let p = (f - 0.5) * pitch;
-        let d = if self.straight { line(key, of, p, self.size) } else { letter(key, of, p, self.size) };
+        let d =
+            if self.straight { line(key, of, p, self.size) } else { letter(key, of, p, self.size) };
         let edge = 0.5 * self.width * (1.0 + 0.3 * smooth(key, at / (2.0 * self.width)));
         let share = step(edge + footprint, (edge - footprint).min(0.6 * edge), d);
         if share > 0.0 {
@@ -312,9 +317,8 @@ fn line(key: Key, of: [i32; 2], p: Vec2, size: f32) -> f32 {
 
 /// Distance to a sign made of strokes between nine places, m.
 fn letter(key: Key, of: [i32; 2], p: Vec2, size: f32) -> f32 {
-    let place = |n: u32| {
-        vec2((n % 3) as f32 - 1.0, (n / 3 % 3) as f32 - 1.0) * vec2(0.28, 0.45) * size
-    };
+    let place =
+        |n: u32| vec2((n % 3) as f32 - 1.0, (n / 3 % 3) as f32 - 1.0) * vec2(0.28, 0.45) * size;
     let mut nearest = f32::INFINITY;
     let h = bits(key, of, 5);
     let mut from = place(h % 9);
