@@ -75,7 +75,7 @@ pub(super) fn stations(crack: &CrackSurface, widening: f32, key: Key) -> Vec<Sta
 
 /// Over what length an end fades, m.
 fn fade(length: f64) -> f32 {
-    (0.15 * length).min(0.03).max(1e-6) as f32
+    (0.15 * length).clamp(1e-6, 0.03) as f32
 }
 
 /// Noise of all wave lengths that concrete's grains leave, root mean square about .5.

@@ -53,16 +53,8 @@ impl Scene {
 
 /// Draws the damage of one member; gives back the meshes that came to the scene.
 fn mark(scene: &mut Scene, member: usize, damage: &SurfaceDamage, widening: f32) -> Vec<Arc<Mesh>> {
-    let concrete: Vec<usize> = (0..scene.objects.len())
-        .filter(|&o| {
-            scene.objects[o].member == Some(member) && scene.objects[o].part == Part::Concrete
-        })
-        .collect();
+    let (concrete, meshes) = concrete(scene, member);
     let Some(&first) = concrete.first() else { return Vec::new() };
-    let meshes: Vec<Mesh> = concrete
-        .iter()
-        .map(|&o| placed(&scene.meshes[scene.objects[o].mesh], &scene.objects[o].transform))
-        .collect();
     let surface = Surface::of(&meshes);
     let (zones, groups) = zones(&surface, damage, widening, member as u64);
     let Carved { faces, slots, bowls } = carve(&meshes, &zones, &groups, damage.spalls.len());
@@ -115,6 +107,15 @@ fn mark(scene: &mut Scene, member: usize, damage: &SurfaceDamage, widening: f32)
     came
 }
 
+/// A member's objects of concrete, and their meshes in the world's frame.
+pub(super) fn concrete(scene: &Scene, member: usize) -> (Vec<usize>, Vec<Mesh>) {
+    let is_its = |o: &Object| o.member == Some(member) && o.part == Part::Concrete;
+    (0..scene.objects.len())
+        .filter(|&o| is_its(&scene.objects[o]))
+        .map(|o| (o, placed(&scene.meshes[scene.objects[o].mesh], &scene.objects[o].transform)))
+        .unzip()
+}
+
 /// What a crack bares: the concrete itself, without what formwork and weather left outside.
 fn inner_material(face: &Material) -> Material {
     Material {
@@ -154,19 +155,42 @@ fn placed(mesh: &Mesh, transform: &Mat4) -> Mesh {
 }
 
 /// The concrete of a member, to put things on.
-struct Surface(Tracer);
+pub(super) struct Surface {
+    triangles: Vec<[Vec3; 3]>,
+    tracer: Tracer,
+}
+
+/// Rays into the member start so far below its surface, m.
+const SKIN: f32 = 1e-4;
 
 impl Surface {
-    fn of(meshes: &[Mesh]) -> Self {
+    pub(super) fn of(meshes: &[Mesh]) -> Self {
         let corners =
             |mesh: &Mesh| (0..mesh.triangles.len()).map(|t| mesh.corners(t)).collect::<Vec<_>>();
-        Self(Tracer::build(&meshes.iter().flat_map(corners).collect::<Vec<_>>()))
+        let triangles: Vec<[Vec3; 3]> = meshes.iter().flat_map(corners).collect();
+        Self { tracer: Tracer::build(&triangles), triangles }
+    }
+
+    fn hits(&self, rays: &[Ray]) -> Vec<Hit> {
+        let mut hits = vec![Hit::MISS; rays.len()];
+        self.tracer.closest(rays, &mut hits, &mut Scratch::default());
+        hits
     }
 
     fn distances(&self, rays: &[Ray]) -> Vec<f32> {
-        let mut hits = vec![Hit::MISS; rays.len()];
-        self.0.closest(rays, &mut hits, &mut Scratch::default());
-        hits.into_iter().map(|hit| hit.t).collect()
+        self.hits(rays).into_iter().map(|hit| hit.t).collect()
+    }
+
+    /// What a ray along a unit direction meets, and the normal there.
+    pub(super) fn meet(&self, from: Vec3, way: Vec3) -> Option<(Vec3, Vec3)> {
+        let hit = self.hits(&[Ray::new(from, way, f32::INFINITY)])[0];
+        let [a, b, c] = *self.triangles.get(hit.triangle as usize)?;
+        Some((from + hit.t * way, (b - a).cross(c - a).try_normalize()?))
+    }
+
+    /// How far it is to the other side from a place on the surface, m; infinite where there is none.
+    pub(super) fn thickness(&self, at: Vec3, outward: Vec3) -> f32 {
+        self.through(&[(at, outward)])[0]
     }
 
     /// The points moved onto the surface along their normals; where none is near they stay.
@@ -181,7 +205,6 @@ impl Surface {
 
     /// How far it is to the other side, from places on the surface, m.
     fn through(&self, points: &[(Vec3, Vec3)]) -> Vec<f32> {
-        const SKIN: f32 = 1e-4;
         let ray = |&(p, outward): &(Vec3, Vec3)| Ray::new(p - SKIN * outward, -outward, 100.0);
         self.distances(&points.iter().map(ray).collect::<Vec<_>>())
     }

@@ -5,6 +5,7 @@ mod carve;
 mod course;
 mod cut;
 mod draw;
+mod planted;
 mod zone;
 
 use std::path::Path;
