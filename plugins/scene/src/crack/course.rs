@@ -6,10 +6,10 @@ use intrados_stage::random::Key;
 use super::CrackSurface;
 use crate::finish::noise::{smooth, step};
 
-/// Length of the straight pieces that a mouth is made of, m.
+/// Length of the straight pieces that a mouth is made of, m, where there are not too many cracks.
 pub(super) const PIECE: f64 = 3e-3;
-/// Most pieces of one crack.
-const MOST_PIECES: f64 = 4000.0;
+/// About so many pieces all cracks of a member get.
+const MOST_PIECES: f64 = 2e5;
 
 /// A place of a mouth.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,11 +37,9 @@ pub(super) struct Station {
 
 /// The mouth's line in pieces, wandering between the points where it was told. Wandering is a share
 /// of what lies between these points: a line that is told closely is left alone.
-pub(super) fn stations(crack: &CrackSurface, widening: f32, key: Key) -> Vec<Station> {
-    let told: Vec<f64> =
-        crack.mouth.windows(2).map(|pair| f64::from(pair[0].at.distance(pair[1].at))).collect();
+pub(super) fn stations(crack: &CrackSurface, piece: f64, widening: f32, key: Key) -> Vec<Station> {
+    let (told, piece) = (told(crack), piece as f32);
     let length: f64 = told.iter().sum();
-    let piece = PIECE.max(length / MOST_PIECES) as f32;
     let mut line: Vec<Station> = Vec::new();
     let mut along = 0.0;
     for (pair, &told) in crack.mouth.windows(2).zip(&told) {
@@ -71,6 +69,17 @@ pub(super) fn stations(crack: &CrackSurface, widening: f32, key: Key) -> Vec<Sta
         along += told as f32;
     }
     line
+}
+
+/// Lengths between the points of a mouth, m.
+fn told(crack: &CrackSurface) -> Vec<f64> {
+    crack.mouth.windows(2).map(|pair| f64::from(pair[0].at.distance(pair[1].at))).collect()
+}
+
+/// How long pieces of a member's cracks are, m.
+pub(super) fn piece_length(cracks: &[CrackSurface]) -> f64 {
+    let length: f64 = cracks.iter().flat_map(told).sum();
+    PIECE.max(length / MOST_PIECES)
 }
 
 /// Over what length an end fades, m.
@@ -126,7 +135,7 @@ mod tests {
             let mouth = vec![point(0.0), point(0.5), point(1.0)];
             let crack = CrackSurface { mouth, normal: Vec3::Y, depth: 0.05 };
             let key = Key::new(seed, 0);
-            let line = stations(&crack, 1.0, key);
+            let line = stations(&crack, PIECE, 1.0, key);
             let ribs = ribs(&line, crack.depth, key);
             assert!(ribs[0].at.distance(DVec3::ZERO) < 1e-7);
             assert!(ribs[ribs.len() - 1].at.distance(DVec3::X) < 1e-7);

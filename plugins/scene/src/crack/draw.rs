@@ -8,7 +8,7 @@ use intrados_stage::random::Key;
 use super::{
     CrackSurface, Spalled, SurfaceDamage,
     carve::{Carved, Group, carve},
-    course::{PIECE, Rib, ribs, stations},
+    course::{Rib, piece_length, ribs, stations},
     zone::{Bowl, Zone},
 };
 use crate::{
@@ -22,6 +22,8 @@ const NEAR: f32 = 0.05;
 const THROUGH: f64 = 0.45;
 /// One chip of a lip on so many metres of crack, where it is wide enough.
 const CHIP_EVERY: f64 = 0.12;
+/// So many spalls show their steel; of more it would not be seen.
+const MOST_BARED: usize = 1000;
 /// Cracks narrower than this have no chips, m.
 const CHIPPED: f64 = 2.5e-4;
 
@@ -218,10 +220,11 @@ fn zones(
     member: u64,
 ) -> (Vec<Zone>, Vec<Group>) {
     let (mut zones, mut groups, mut bowls) = (Vec::new(), Vec::new(), Vec::new());
+    let piece = piece_length(&damage.cracks);
     for (number, crack) in damage.cracks.iter().enumerate() {
         let key = Key::new(member, number as u64);
-        let ribs = laid(surface, crack, widening, key);
-        let points = beside(&ribs);
+        let ribs = laid(surface, crack, piece, widening, key);
+        let points = beside(&ribs, piece);
         bowls.extend(chips(&ribs, key));
         let begin = zones.len();
         zones.extend(ribs.windows(2).map(|pair| Zone::Slot([pair[0], pair[1]])));
@@ -244,8 +247,8 @@ fn zones(
 }
 
 /// A crack's ribs, on the surface and no deeper than its member bears.
-fn laid(surface: &Surface, crack: &CrackSurface, widening: f32, key: Key) -> Vec<Rib> {
-    let mut line = stations(crack, widening, key);
+fn laid(surface: &Surface, crack: &CrackSurface, piece: f64, widening: f32, key: Key) -> Vec<Rib> {
+    let mut line = stations(crack, piece, widening, key);
     let places = |line: &[super::course::Station]| -> Vec<(Vec3, Vec3)> {
         line.iter().map(|s| (s.at, s.outward)).collect()
     };
@@ -263,10 +266,10 @@ fn laid(surface: &Surface, crack: &CrackSurface, widening: f32, key: Key) -> Vec
 
 /// Points about a crack, in rows ever wider apart: without them the face would become slivers from
 /// the crack to the corners of the member.
-fn beside(ribs: &[Rib]) -> Vec<(DVec3, f64, DVec3)> {
+fn beside(ribs: &[Rib], piece: f64) -> Vec<(DVec3, f64, DVec3)> {
     const FARTHEST: f64 = 1.0;
     let mut points = Vec::new();
-    let mut apart = 2.5 * PIECE;
+    let mut apart = 2.5 * piece;
     let mut every = 2;
     while apart < FARTHEST && every / 2 < ribs.len() {
         for i in (0..ribs.len()).step_by(every) {
@@ -334,7 +337,7 @@ fn bared(scene: &Scene, member: usize, spalls: &[Spalled]) -> Mesh {
         return mesh;
     }
     let is_near = |p: Vec3| {
-        spalls.iter().any(|s| {
+        spalls.iter().take(MOST_BARED).any(|s| {
             let from = p - s.centre;
             let below = -from.dot(s.outward);
             let aside = (from + below * s.outward).length();
@@ -367,7 +370,7 @@ fn bared(scene: &Scene, member: usize, spalls: &[Spalled]) -> Mesh {
 mod tests {
     use intrados_stage::Job;
 
-    use super::*;
+    use super::{super::course::PIECE, *};
     use crate::Mouth;
 
     fn at(p: Vec3, outward: Vec3, width: f32) -> Mouth {
@@ -501,7 +504,7 @@ mod tests {
         let tracer = Tracer::build(&triangles);
         let meshes = [Mesh::default()];
         let ribs = {
-            let line = stations(&crack, 1.0, Key::new(0, 0));
+            let line = stations(&crack, PIECE, 1.0, Key::new(0, 0));
             ribs(&line, crack.depth, Key::new(0, 0))
         };
         assert_eq!(meshes.len(), 1);
