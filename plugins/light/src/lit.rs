@@ -8,7 +8,7 @@ use std::{
 
 use glam::{Mat3, Vec2, Vec3};
 use intrados_scene::{
-    Camera, Hit, Material, Mesh, Object, Part, Ray, Scene, Surface, TextureRef, Tracer,
+    Camera, FinishKind, Hit, Material, Mesh, Object, Part, Ray, Scene, Surface, TextureRef, Tracer,
     finish::{Appearance, Unwrap},
     tracer,
 };
@@ -710,9 +710,13 @@ impl Look {
             if determinant.abs() > 1e-30 { linear.inverse().transpose() } else { Mat3::IDENTITY };
         let plain = (!smooth && !textured)
             .then(|| Bsdf::new(&material.surface, material.base_colour, Vec3::ONE));
-        let unwrap = material.finish.is_some().then(|| {
+        let unwrap = material.finish.as_ref().map(|finish| {
             let placed = |p| object.transform.transform_point3(p);
-            Unwrap::of((0..mesh.triangles.len()).map(|t| mesh.corners(t).map(placed)))
+            let triangles = (0..mesh.triangles.len()).map(|t| mesh.corners(t).map(placed));
+            match finish.kind() {
+                FinishKind::Broken => Unwrap::of_rough(triangles),
+                _ => Unwrap::of(triangles),
+            }
         });
         Self { plain, normal_matrix, mirrored: determinant < 0.0, smooth, unwrap }
     }

@@ -16,6 +16,8 @@ pub struct Place {
 pub struct Unwrap {
     /// Of a round shape: index of its axis, its centre across that, its radius, m.
     round: Option<(usize, Vec2, f32)>,
+    /// Of what is too rough to be laid flat face by face: the direction from which it is seen.
+    facing: Option<Vec3>,
 }
 
 /// So many directions of faces about an axis make a shape round.
@@ -48,12 +50,21 @@ impl Unwrap {
         let axis = (0..3).min_by(|&i, &j| spread[i].total_cmp(&spread[j])).unwrap_or(1);
         let (centre, size) = (around(0.5 * (low + high), axis), around(high - low, axis));
         let is_round = directions[axis].len() >= ROUND;
-        Self { round: is_round.then(|| (axis, centre, 0.25 * (size.x + size.y).max(4e-3))) }
+        let round = is_round.then(|| (axis, centre, 0.25 * (size.x + size.y).max(4e-3)));
+        Self { round, facing: None }
+    }
+
+    /// Of a rough surface by its triangles in the world: as it is seen from where most of it faces.
+    #[must_use]
+    pub fn of_rough(triangles: impl Iterator<Item = [Vec3; 3]>) -> Self {
+        let mean = triangles.map(|[a, b, c]| (b - a).cross(c - a)).sum::<Vec3>();
+        Self { round: None, facing: mean.try_normalize() }
     }
 
     /// The place of a point whose face has this unit normal.
     #[must_use]
     pub fn place(&self, point: Vec3, normal: Vec3) -> Place {
+        let normal = self.facing.unwrap_or(normal);
         if let Some((axis, centre, radius)) = self.round
             && normal[axis].abs() < 0.7
         {
