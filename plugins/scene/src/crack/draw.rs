@@ -124,7 +124,7 @@ fn inner_material(face: &Material) -> Material {
         name: "crack".into(),
         assumed: false,
         surface: Brdf::Lambert,
-        base_colour: face.base_colour,
+        base_colour: face.base_colour * face.finish.as_ref().map_or(Vec3::ONE, |f| f.tint()),
         ..Material::default()
     }
 }

@@ -87,6 +87,12 @@ impl Finish {
         self.kind
     }
 
+    /// Factor of the material's colour that the concrete itself has, inside as outside.
+    #[must_use]
+    pub fn tint(&self) -> Vec3 {
+        self.base.tint
+    }
+
     /// Whether it has rust or efflorescence on it.
     #[must_use]
     pub fn is_stained(&self) -> bool {

@@ -131,6 +131,16 @@ fn brushed(draw: &mut Dice) -> Vec<Relief> {
         dark: 0.1,
     };
     let mut reliefs = vec![Relief::Rough(lines), sand(draw)];
+    if draw.chance(0.35) {
+        // Sawn or formed joints of slabs, some of them sealed.
+        reliefs.push(Relief::Joints(Joints {
+            panel: vec2(draw.between(0.8, 4.0), draw.between(0.8, 4.0)),
+            width: draw.log(3e-3, 15e-3),
+            depth: draw.between(0.0, 5e-3),
+            tone: draw.between(0.02, 0.2),
+            dark: draw.between(0.2, 0.8),
+        }));
+    }
     if draw.chance(0.4) {
         reliefs.push(pores(draw));
     }
@@ -141,9 +151,9 @@ fn broken(draw: &mut Dice) -> Vec<Relief> {
     let size = draw.log(7e-3, 18e-3);
     let stones = Stones {
         size,
-        height: 0.25 * size,
-        tone: draw.between(0.3, 0.8),
-        dark: draw.between(0.0, 0.15),
+        height: 0.12 * size,
+        tone: draw.between(0.15, 0.5),
+        dark: draw.between(-0.1, 0.1),
     };
     vec![
         rough(draw, 0.04, 4, [3e-3, 6e-3], 0.15),
@@ -192,6 +202,8 @@ fn base(kind: FinishKind, draw: &mut Dice) -> Base {
     let mut tint = Vec3::new(1.0 + warm, 1.0, 1.0 - 1.4 * warm) * draw.between(0.75, 1.15);
     match kind {
         FinishKind::Asphalt => tint *= draw.between(0.25, 0.6),
+        // Its material is already the member's own.
+        FinishKind::Broken => tint = Vec3::splat(draw.between(0.85, 1.1)),
         FinishKind::Plaster if draw.chance(0.4) => {
             tint *= Vec3::new(1.25, draw.between(1.08, 1.22), draw.between(0.75, 1.1));
         }
