@@ -486,7 +486,7 @@ mod tests {
             triangles.iter().map(area).sum::<f64>()
         };
         let (old, new) = (flat(&concrete(&scene)), flat(&concrete(&after)));
-        assert!((new / old - 1.0).abs() < 2e-4, "{old} {new}");
+        assert!((new / old - 1.0).abs() < 1e-6, "{old} {new}");
         assert_eq!(open_edges(&concrete(&after)), 0);
     }
 
@@ -502,12 +502,10 @@ mod tests {
         let crack = crack(mouth, 0.04);
         let triangles = concrete(&marked(&scene, vec![crack.clone()], Vec::new()));
         let tracer = Tracer::build(&triangles);
-        let meshes = [Mesh::default()];
         let ribs = {
             let line = stations(&crack, PIECE, 1.0, Key::new(0, 0));
             ribs(&line, crack.depth, Key::new(0, 0))
         };
-        assert_eq!(meshes.len(), 1);
         let mut deep = 0;
         for rib in &ribs[5..ribs.len() - 5] {
             let middle = (0.5 * (rib.lips[0] + rib.lips[1])).as_vec3();
