@@ -8,7 +8,9 @@ use std::{
 
 use glam::{Mat3, Vec2, Vec3};
 use intrados_scene::{
-    Hit, Material, Mesh, Object, Part, Ray, Scene, Surface, TextureRef, Tracer, tracer,
+    Camera, FinishKind, Hit, Material, Mesh, Object, Part, Ray, Scene, Surface, TextureRef, Tracer,
+    finish::{Appearance, Unwrap},
+    tracer,
 };
 use intrados_stage::{Cancelled, Job};
 use wide::f32x8;
@@ -53,6 +55,8 @@ pub struct LitScene {
     pub(crate) sky: Option<usize>,
     /// Pieces of surface, found when somebody asks.
     charts: OnceLock<Arc<Charts>>,
+    /// Where the scene's cameras stand, and the angle of their pixels.
+    eyes: Vec<(Vec3, f32)>,
     cells: OnceLock<Cells>,
 }
 
@@ -61,6 +65,9 @@ pub struct LitScene {
 /// it is. Whole numbers are bits; no source is a NaN.
 #[derive(Debug, Clone, Copy)]
 struct Facet([f32x8; 2]);
+
+/// So many cameras have a say in how fine finishes are.
+const MOST_EYES: usize = 4;
 
 const NO_SOURCE: u32 = u32::MAX;
 
@@ -143,6 +150,8 @@ struct Look {
     /// Whether the transform mirrors, so that two corners were swapped.
     mirrored: bool,
     smooth: bool,
+    /// Of an object with a finish: how it is laid flat.
+    unwrap: Option<Unwrap>,
 }
 
 /// Eight places that walks have reached. Masks have a bit a lane.
@@ -274,7 +283,10 @@ impl LitScene {
             .collect();
         let colours = looks.iter().map(Look::colour).collect();
         let tracer = Tracer::build_job(&corners, job)?;
+        let eye = |c: &Camera| (c.position, 2.0 * c.half_extent()[0] / c.width.max(1) as f32);
+        let eyes = scene.cameras.iter().take(MOST_EYES).map(eye).collect();
         let mut lit = Self {
+            eyes,
             scene,
             tracer,
             facets,
@@ -549,15 +561,16 @@ impl LitScene {
         match look.plain {
             Some(bsdf) => Point { bsdf, ..plain },
             None => {
-                let (shading, bsdf) =
-                    self.shade(triangle, look.mesh_weights(points.at(lane)), plain.geometric);
+                let weights = look.mesh_weights(points.at(lane));
+                let (shading, bsdf) = self.shade(triangle, weights, &plain);
                 Point { shading, bsdf, ..plain }
             }
         }
     }
 
     /// Shading normal and BSDF where they vary over the object.
-    fn shade(&self, triangle: u32, weights: [f32; 3], geometric: Vec3) -> (Vec3, Bsdf) {
+    fn shade(&self, triangle: u32, weights: [f32; 3], plain: &Point) -> (Vec3, Bsdf) {
+        let geometric = plain.geometric;
         let [o, t] = self.places[triangle as usize];
         let (object, look) = (&self.scene.objects[o as usize], &self.looks[o as usize]);
         let (mesh, material) =
@@ -584,6 +597,16 @@ impl LitScene {
         if !mesh.colours.is_empty() {
             base *= interpolate(corners.map(|i| mesh.colours[i]), weights);
         }
+        if let (Some(finish), Some(unwrap)) = (&material.finish, &look.unwrap) {
+            let place = unwrap.place(plain.position, shading);
+            let seen = finish.at(place.at, self.footprint(plain.position), base);
+            let [u, v] = place.axes;
+            shading = aligned(
+                (shading - seen.slope.x * u - seen.slope.y * v).normalize_or(shading),
+                geometric,
+            );
+            base = seen.colour;
+        }
         let packed = match &material.surface {
             Surface::Metallic { texture: Some(texture), .. } => {
                 self.texel(texture, object, t, weights)
@@ -591,6 +614,23 @@ impl LitScene {
             _ => Vec3::ONE,
         };
         (shading, Bsdf::new(&material.surface, base, packed))
+    }
+
+    /// What a finish at `place` tells, and none where the triangle has none: its appearance with
+    /// the material's own colour.
+    pub(crate) fn appearance(&self, triangle: u32, place: Vec3) -> Option<Appearance> {
+        let look = &self.looks[self.places[triangle as usize][0] as usize];
+        let material = self.object_material(triangle);
+        let (finish, unwrap) = (material.finish.as_ref()?, look.unwrap?);
+        let at = unwrap.place(place, self.normal(triangle)).at;
+        Some(finish.at(at, self.footprint(place), material.base_colour))
+    }
+
+    /// How much of a face one pixel of the nearest camera covers, m. A function of the place alone,
+    /// so that walks of both sides meet the same surface.
+    fn footprint(&self, place: Vec3) -> f32 {
+        let of = |&(eye, angle): &(Vec3, f32)| (place - eye).length() * angle;
+        self.eyes.iter().map(of).reduce(f32::min).unwrap_or(1e-3).clamp(2e-4, 0.02)
     }
 
     fn texel(&self, texture: &TextureRef, object: &Object, t: u32, weights: [f32; 3]) -> Vec3 {
@@ -661,6 +701,7 @@ impl Look {
         let textured = material.base_texture.is_some()
             || material.normal_texture.is_some()
             || !mesh.colours.is_empty()
+            || material.finish.is_some()
             || matches!(material.surface, Surface::Metallic { texture: Some(_), .. });
         let determinant = linear.determinant();
         // Inverse transpose up to a positive factor; a flat scale has none, and then no normals
@@ -669,7 +710,15 @@ impl Look {
             if determinant.abs() > 1e-30 { linear.inverse().transpose() } else { Mat3::IDENTITY };
         let plain = (!smooth && !textured)
             .then(|| Bsdf::new(&material.surface, material.base_colour, Vec3::ONE));
-        Self { plain, normal_matrix, mirrored: determinant < 0.0, smooth }
+        let unwrap = material.finish.as_ref().map(|finish| {
+            let placed = |p| object.transform.transform_point3(p);
+            let triangles = (0..mesh.triangles.len()).map(|t| mesh.corners(t).map(placed));
+            match finish.kind() {
+                FinishKind::Broken => Unwrap::of_rough(triangles),
+                _ => Unwrap::of(triangles),
+            }
+        });
+        Self { plain, normal_matrix, mirrored: determinant < 0.0, smooth, unwrap }
     }
 
     /// Red, green, blue and the mask of what is shaded eight at a time.

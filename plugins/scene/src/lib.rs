@@ -3,6 +3,7 @@
 pub mod attach;
 pub mod crack;
 pub mod file;
+pub mod finish;
 pub mod gltf;
 pub mod import;
 pub mod lamp;
@@ -22,6 +23,7 @@ pub mod tracer;
 
 pub use crack::{CrackSurface, Mouth, Spalled, SurfaceDamage, SurfaceFile};
 pub use file::reference;
+pub use finish::{Finish, FinishKind};
 pub use lamp::{Lamp, LampKind};
 pub use lens::Lens;
 pub use load::{Card, ErrorKind, LoadError, bundled, cards, validate};

@@ -1,6 +1,10 @@
 //! Materials and textures.
 
+use std::sync::Arc;
+
 use glam::{Affine2, Vec2, Vec3};
+
+use crate::Finish;
 
 /// What a surface does with light: the parameters of its BRDF f_r (eq. 2.3) and its emission L_e.
 #[derive(Debug, Clone, PartialEq)]
@@ -21,6 +25,9 @@ pub struct Material {
     pub emission_texture: Option<TextureRef>,
     /// Tangent-space normals, and their scale.
     pub normal_texture: Option<(TextureRef, f32)>,
+    /// What formwork, weather and people left: changes `base_colour` from place to place and bends
+    /// normals.
+    pub finish: Option<Arc<Finish>>,
 }
 
 /// The families of BRDF.
@@ -60,6 +67,7 @@ impl Default for Material {
             emission: Vec3::ZERO,
             emission_texture: None,
             normal_texture: None,
+            finish: None,
         }
     }
 }

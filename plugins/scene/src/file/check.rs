@@ -510,6 +510,9 @@ impl Checker<'_> {
         if let Some(texture) = &m.texture {
             self.text("texture", texture);
         }
+        if let Some(finish) = &m.finish {
+            self.within("finish.worn", finish.worn, 0.0, 1.0);
+        }
         match m.surface {
             Surface::Lambert | Surface::Black => {}
             Surface::Metallic { metallic, roughness } => {

@@ -7,7 +7,7 @@ use std::{
 };
 
 use glam::{Mat4, Quat, Vec2, Vec3};
-use intrados_stage::{Access, Job};
+use intrados_stage::{Access, Job, random::Key};
 
 use super::{
     Assumed, Lamp, Material, Meter, SceneFile, Shape, Strength, Surface, doubts,
@@ -169,6 +169,10 @@ impl Builder<'_> {
             base_colour: m.colour,
             base_texture,
             emission: m.emission,
+            finish: m
+                .finish
+                .as_ref()
+                .map(|f| Arc::new(crate::Finish::new(f.kind, Key::new(f.seed, 0), f.worn))),
             ..crate::Material::default()
         });
         Ok(())

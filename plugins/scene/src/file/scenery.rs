@@ -4,7 +4,7 @@ use glam::{EulerRot, Mat4, Quat, Vec3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::Lens;
+use crate::{FinishKind, Lens};
 
 fn one() -> Vec3 {
     Vec3::ONE
@@ -12,6 +12,10 @@ fn one() -> Vec3 {
 
 fn up() -> Vec3 {
     Vec3::Y
+}
+
+fn some() -> f32 {
+    0.4
 }
 
 fn yes() -> bool {
@@ -34,10 +38,27 @@ pub struct Material {
     /// Image that multiplies `colour`: PNG or JPEG (sRGB) or EXR (linear).
     #[serde(default)]
     pub texture: Option<String>,
+    /// What formwork, weather and people left on it.
+    #[serde(default)]
+    pub finish: Option<Finish>,
     /// Emitted radiance, W·m⁻²·sr⁻¹, on the front side.
     #[serde(default)]
     #[schemars(with = "[f32; 3]")]
     pub emission: Vec3,
+}
+
+/// What formwork, weather and people left on a face: colour and relief, drawn by `seed`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Finish {
+    /// What it was made against.
+    pub kind: FinishKind,
+    /// Another number, another face.
+    #[serde(default)]
+    pub seed: u64,
+    /// 0: as struck; 1: dirty, stained, written upon.
+    #[serde(default = "some")]
+    pub worn: f32,
 }
 
 /// The families of BRDF.

@@ -68,6 +68,7 @@ impl<'a> Reader<'a> {
                 let scale = json.field("normalTexture").number("scale").unwrap_or(1.0);
                 (t, scale as f32)
             }),
+            finish: None,
         }
     }
 
