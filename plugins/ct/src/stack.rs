@@ -85,49 +85,61 @@ pub(crate) fn sections(
     let mut reader = Reader::pile(images.to_vec(), voxel)?;
     let grid = *reader.grid();
     let extent = extent(&mut reader)?;
-    let cuts: Vec<(Normal, usize)> = planes
-        .iter()
-        .map(|p| {
-            let [from, to] = extent[p.normal as usize];
-            (p.normal, from + (p.share * (to - from) as f64) as usize)
-        })
-        .collect();
-    let mut pictures: Vec<Grid<f32>> =
-        cuts.iter().map(|(normal, _)| blank(&grid, *normal)).collect();
-    if pictures.iter().map(|p| p.data.len()).sum::<usize>() > MOST_PIXELS {
+    let mut cuts: Vec<Cut> = planes.iter().map(|p| Cut::new(*p, &grid, &extent)).collect();
+    if cuts.iter().map(|c| c.picture.data.len()).sum::<usize>() > MOST_PIXELS {
         let why = "has too many voxels to be cut: bin them";
         return Err(VolumeError::bad(reader.path(), why));
     }
-    let [width, _, depth] = grid.size;
-    for z in 0..depth {
-        job.step(z, depth)?;
+    for z in 0..grid.size[2] {
+        job.step(z, grid.size[2])?;
         let layer = reader.read_slab(z..z + 1, &Job::default())?.data;
-        for ((normal, at), picture) in cuts.iter().zip(&mut pictures) {
-            let row = |picture: &mut Grid<f32>, values: &mut dyn Iterator<Item = f32>| {
-                let row = picture.data.iter_mut().skip(z * picture.width);
-                row.zip(values).for_each(|(to, from)| *to = from);
-            };
-            match normal {
-                Normal::Z if *at == z => picture.data.copy_from_slice(&layer),
-                Normal::Z => {}
-                Normal::Y => row(picture, &mut layer[at * width..(at + 1) * width].iter().copied()),
-                Normal::X => row(picture, &mut layer.iter().skip(*at).step_by(width).copied()),
+        cuts.iter_mut().for_each(|cut| cut.take(z, &layer, grid.size[0]));
+    }
+    let name = reader.path().file_name().unwrap_or_default().to_string_lossy().into_owned();
+    Ok(cuts.into_iter().map(|cut| cut.section(&name, &grid)).collect())
+}
+
+/// A section that is being filled.
+struct Cut {
+    normal: Normal,
+    /// Which layer of voxels.
+    at: usize,
+    picture: Grid<f32>,
+}
+
+impl Cut {
+    fn new(plane: Plane, grid: &Voxels, extent: &Extent) -> Self {
+        let [from, to] = extent[plane.normal as usize];
+        let at = from + (plane.share * (to - from) as f64) as usize;
+        let [width, height] = axes(plane.normal).map(|k| grid.size[k]);
+        Self { normal: plane.normal, at, picture: Grid::new(width, height, 0.0) }
+    }
+
+    /// Takes what lies in it of slice `z`, whose rows are `width` long.
+    fn take(&mut self, z: usize, slice: &[f32], width: usize) {
+        let rows = self.picture.width;
+        let row = self.picture.data.iter_mut().skip(z * rows).take(rows);
+        match self.normal {
+            Normal::Z if self.at == z => self.picture.data.copy_from_slice(slice),
+            Normal::Z => {}
+            Normal::Y => row.zip(&slice[self.at * width..]).for_each(|(to, from)| *to = *from),
+            Normal::X => {
+                let column = slice.iter().skip(self.at).step_by(width);
+                row.zip(column).for_each(|(to, from)| *to = *from);
             }
         }
     }
-    let name = reader.path().file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let cut = |((normal, at), picture): ((Normal, usize), Grid<f32>)| {
+
+    /// Its picture with square pixels; none where they are too long for that.
+    fn section(self, file: &str, grid: &Voxels) -> Option<Section> {
         let mm = grid.voxel.map(|m| 1e3 * m);
-        let [x, y] = axes(normal).map(|k| mm[k]);
-        let (grey, pixel_mm) = squared(picture, [x, y])?;
-        let label = ["x", "y", "z"][normal as usize];
+        let (grey, pixel_mm) = squared(self.picture, axes(self.normal).map(|k| mm[k]))?;
+        let k = self.normal as usize;
         let mut from_middle_mm = [0.0; 3];
-        let k = normal as usize;
-        from_middle_mm[k] = (at as f64 - 0.5 * (grid.size[k] as f64 - 1.0)) * mm[k];
-        let slice = Slice { name: format!("{name}#{label}{at}"), grey, pixel_mm: pixel_mm as f32 };
-        Some(Section { slice, from_middle_mm })
-    };
-    Ok(cuts.into_iter().zip(pictures).map(cut).collect())
+        from_middle_mm[k] = (self.at as f64 - 0.5 * (grid.size[k] as f64 - 1.0)) * mm[k];
+        let name = format!("{file}#{}{}", ["x", "y", "z"][k], self.at);
+        Some(Section { slice: Slice { name, grey, pixel_mm: pixel_mm as f32 }, from_middle_mm })
+    }
 }
 
 /// What runs to the right and down in a picture across `normal`.
@@ -139,11 +151,6 @@ fn axes(normal: Normal) -> [usize; 2] {
     }
 }
 
-fn blank(grid: &Voxels, normal: Normal) -> Grid<f32> {
-    let [width, height] = axes(normal).map(|k| grid.size[k]);
-    Grid::new(width, height, 0.0)
-}
-
 /// The box of what is not air, as the slice in the middle shows it, and all of the pile.
 fn extent(reader: &mut Reader) -> Result<Extent, VolumeError> {
     let [width, height, depth] = reader.grid().size;
@@ -152,21 +159,19 @@ fn extent(reader: &mut Reader) -> Result<Extent, VolumeError> {
     let mut sorted = layer.clone();
     let tenth = sorted.len() - 1 - sorted.len() / 10;
     let (_, bright, _) = sorted.select_nth_unstable_by(tenth, f32::total_cmp);
-    let (half, mut range) = (0.5 * *bright, [[usize::MAX, 0]; 2]);
-    // Noise and rings in air are alone: a column or row of the body has many bright pixels.
+    let half = 0.5 * *bright;
     let mut count = [vec![0; width], vec![0; height]];
     for (i, _) in layer.iter().enumerate().filter(|(_, v)| **v > half) {
         count[0][i % width] += 1;
         count[1][i / width] += 1;
     }
-    for (range, (count, across)) in range.iter_mut().zip(count.iter().zip([height, width])) {
-        let inside = |n: &&(usize, &usize)| *n.1 > across / 50;
-        count.iter().enumerate().collect::<Vec<_>>().iter().filter(inside).for_each(|(i, _)| {
-            *range = [range[0].min(*i), range[1].max(i + 1)];
-        });
-    }
-    let whole = |[from, to]: [usize; 2], all| if from < to { [from, to] } else { [0, all] };
-    Ok([whole(range[0], width), whole(range[1], height), [0, depth]])
+    // Noise and rings in air are alone: where the body is, a row has many bright pixels.
+    let range = |count: &[usize], across: usize| {
+        let is_body = |n: &usize| *n > across / 50;
+        let from = count.iter().position(is_body).unwrap_or(0);
+        [from, count.iter().rposition(is_body).map_or(count.len(), |last| last + 1)]
+    };
+    Ok([range(&count[0], height), range(&count[1], width), [0, depth]])
 }
 
 /// The same picture with square pixels, as large as the longer edge of what they were: means over
