@@ -558,8 +558,11 @@ pub(crate) struct Render {
     /// Cracks and missing cover that `intrados analyze --out` found (its cracks.json)
     #[arg(long, value_name = "FILE")]
     pub(crate) cracks: Option<PathBuf>,
+    /// The damage that the scene has planted, with its true shape
+    #[arg(long, conflicts_with = "cracks")]
+    pub(crate) planted: bool,
     /// Show those cracks so many times as wide as they are
-    #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = widening, requires = "cracks")]
+    #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = widening)]
     pub(crate) widen: f32,
     #[command(flatten)]
     pub(crate) size: Size,

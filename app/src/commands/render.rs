@@ -114,11 +114,12 @@ impl Work for Picture<'_> {
 }
 
 pub(crate) fn run(session: &Session, args: &args::Render) -> Result<Outcome, Failure> {
-    let opened = walks::open_damaged(
-        session,
-        &args.scene,
-        args.cracks.as_deref().map(|file| (file, args.widen)),
-    )?;
+    let shown = match &args.cracks {
+        Some(file) => walks::Shown::File(file),
+        None if args.planted => walks::Shown::Planted,
+        None => walks::Shown::Nothing,
+    };
+    let opened = walks::open_damaged(session, &args.scene, shown, args.widen)?;
     let camera = walks::sized(walks::camera(&opened.scene, args.camera.as_deref())?, &args.size)?;
     let rule = walks::rule(&opened.scene, &args.light);
     let sides = args.light.side.map_or(Sides::Primal, Into::into);

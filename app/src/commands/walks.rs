@@ -38,18 +38,34 @@ pub(crate) fn load(session: &Session, path: &Path) -> Result<Scene, Failure> {
 
 /// Loads a scene and compiles it.
 pub(crate) fn open(session: &Session, path: &Path) -> Result<Opened, Failure> {
-    open_damaged(session, path, None)
+    open_damaged(session, path, Shown::Nothing, 1.0)
 }
 
-/// The same with the cracks of a file, shown so many times as wide as they are.
+/// The damage that a picture shows.
+#[derive(Clone, Copy)]
+pub(crate) enum Shown<'a> {
+    /// None.
+    Nothing,
+    /// What the scene has planted.
+    Planted,
+    /// The cracks of a file.
+    File(&'a Path),
+}
+
+/// The same with damage, its cracks so many times as wide as they are.
 pub(crate) fn open_damaged(
     session: &Session,
     path: &Path,
-    cracks: Option<(&Path, f32)>,
+    shown: Shown<'_>,
+    widen: f32,
 ) -> Result<Opened, Failure> {
     let mut scene = load(session, path)?;
-    if let Some((file, widen)) = cracks {
-        scene = scene.marked(&SurfaceFile::read(file, &scene)?.members, widen);
+    match shown {
+        Shown::Nothing => {}
+        Shown::Planted => scene = scene.marked(&scene.planted(), widen),
+        Shown::File(file) => {
+            scene = scene.marked(&SurfaceFile::read(file, &scene)?.members, widen);
+        }
     }
     let scene = Arc::new(scene);
     let _progress = session.watch(format!("preparing {} for light", scene.name));
