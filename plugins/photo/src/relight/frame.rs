@@ -24,6 +24,8 @@ pub(super) struct Frame {
     whole: [f64; 2],
     /// What each pixel shows and nothing else.
     pub(super) shown: Vec<Option<Shown>>,
+    /// Whether a member's face is seen in its middle.
+    pub(super) has_face: Vec<bool>,
 }
 
 /// What a pixel shows.
@@ -51,24 +53,38 @@ impl Frame {
         let rows = (whole[1] / scale - 1e-9).ceil().max(1.0);
         let size = [columns as usize, rows as usize];
         let top = 0.5 * (whole[1] - rows * scale);
-        let mut frame = Self { size, scale, top, whole, shown: Vec::new() };
+        let (shown, has_face) = (Vec::new(), Vec::new());
+        let mut frame = Self { size, scale, top, whole, shown, has_face };
         let row = |y: usize| {
             if job.is_cancelled() {
                 return Vec::new();
             }
             (0..size[0]).map(|x| frame.shows(site, located, [x, y])).collect::<Vec<_>>()
         };
-        let shown: Vec<_> = (0..size[1]).into_par_iter().flat_map_iter(row).collect();
+        let found: Vec<_> = (0..size[1]).into_par_iter().flat_map_iter(row).collect();
         if job.is_cancelled() {
             return Err(Cancelled);
         }
-        frame.shown = shown;
+        (frame.shown, frame.has_face) = found.into_iter().unzip();
         Ok(frame)
     }
 
-    fn shows(&self, site: &Site, located: &Located, [x, y]: [usize; 2]) -> Option<Shown> {
+    /// What a pixel shows and nothing else, and whether its middle is on a member's face.
+    fn shows(&self, site: &Site, located: &Located, [x, y]: [usize; 2]) -> (Option<Shown>, bool) {
         let at = self.in_photo([x as f64 + 0.5, y as f64 + 0.5]);
-        let (piece, place) = site.pieces(&located.pose, &[at])[0]?;
+        let Some((piece, place)) = site.pieces(&located.pose, &[at])[0] else {
+            return (None, false);
+        };
+        (self.shows_wholly(site, located, at, (piece, place)), piece.face.is_some())
+    }
+
+    fn shows_wholly(
+        &self,
+        site: &Site,
+        located: &Located,
+        at: [f64; 2],
+        (piece, place): (Piece, DVec3),
+    ) -> Option<Shown> {
         let c = located.pixel_covariance(place)?;
         let reach = |v: f64| 0.5 * self.scale + SURE * v.max(0.0).sqrt();
         let [dx, dy] = [reach(c[(0, 0)]), reach(c[(1, 1)])];

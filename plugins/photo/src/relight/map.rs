@@ -25,6 +25,17 @@ pub struct ReflectanceMap {
     pub(super) turn: Option<f64>,
 }
 
+impl ReflectanceMap {
+    /// Of green, over what is known.
+    #[must_use]
+    pub fn median_log_error(&self) -> Option<f32> {
+        let known = self.log_error.iter().map(|e| e.y).filter(|e| e.is_finite());
+        let mut all: Vec<f32> = known.collect();
+        let middle = all.len() / 2;
+        (!all.is_empty()).then(|| *all.select_nth_unstable_by(middle, f32::total_cmp).1)
+    }
+}
+
 impl Relit {
     /// The reflectance of a face in the photograph that this was found from, at `mm_px` millimetres
     /// a pixel; maps of one face at one scale lie on one grid.

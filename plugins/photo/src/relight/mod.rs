@@ -136,7 +136,7 @@ pub struct Relit {
     /// By pixel of the frame: ŷ over the reflectance that it was computed with, by channel, and the
     /// variance of its logarithm; NaN where light is unknown.
     expected: Vec<[f64; 6]>,
-    /// Share of the frame's pixels that show members' faces of which that or the photograph is so.
+    /// Share of the frame's pixels that show members' faces of which nothing is known.
     unknown: f64,
     rounds: u32,
     reflected_share: f64,
@@ -372,10 +372,9 @@ fn expected(
     (0..lit.len()).into_par_iter().map(at).collect()
 }
 
-/// Share of the pixels that wholly show a member's face of which nothing can be said.
+/// Share of the pixels that show a member's face of which nothing can be said.
 fn unknown(frame: &Frame, averaged: &[Option<[f64; 3]>], expected: &[[f64; 6]]) -> f64 {
-    let is_face = |s: &Option<frame::Shown>| s.is_some_and(|s| s.piece.face.is_some());
-    let faces: Vec<usize> = (0..frame.shown.len()).filter(|k| is_face(&frame.shown[*k])).collect();
+    let faces: Vec<usize> = (0..frame.shown.len()).filter(|k| frame.has_face[*k]).collect();
     let dark = faces.iter().filter(|k| averaged[**k].is_none() || !expected[**k][0].is_finite());
     dark.count() as f64 / faces.len().max(1) as f64
 }

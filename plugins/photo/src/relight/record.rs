@@ -32,7 +32,7 @@ pub struct RelitRecord {
     pub residual_scatter: [f64; 3],
     /// Share of light on members that was reflected on its way.
     pub reflected_share: f64,
-    /// Share of the pixels that show members of which the reflectance is unknown.
+    /// Share of the pixels that show members' faces of which the reflectance is unknown.
     pub unknown: f64,
     /// Times that light was computed.
     pub rounds: u32,
