@@ -21,7 +21,6 @@ use intrados_stage::file::{Set, file_name, file_names};
 use serde::Serialize;
 
 use super::walks;
-use relit::{Kept, MergedFace};
 use crate::{
     args,
     failure::{Failure, Outcome},
@@ -29,6 +28,7 @@ use crate::{
     picture::{Facts, png_of_colours},
     session::{Session, one_line},
 };
+use relit::{Kept, MergedFace};
 
 /// Standard error of k1 before anything is picked: barrels of zooms at their wide end reach some
 /// −.1, and cameras that correct their pictures are near 0 (ours).

@@ -178,7 +178,8 @@ pub(crate) fn sample(photograph: &Photograph, Look { at, sides }: &Look) -> Opti
     for i in 0..counts[0] {
         for j in 0..counts[1] {
             let (s, t) = (share(i, counts[0]), share(j, counts[1]));
-            sum += photograph.light_at([0, 1].map(|k| at[k] + s * sides[0][k] + t * sides[1][k]))?;
+            sum +=
+                photograph.light_at([0, 1].map(|k| at[k] + s * sides[0][k] + t * sides[1][k]))?;
         }
     }
     Some(sum / (counts[0] * counts[1]) as f32)

@@ -206,7 +206,8 @@ impl Site {
             let face = surface.and_then(|surface| surface.face_of(place, normal));
             let size = normal.abs();
             let axis = (0..3).max_by(|a, b| size[*a].total_cmp(&size[*b])).unwrap_or(0);
-            let way = if face.is_some() { 0 } else { 1 + 2 * axis + usize::from(normal[axis] < 0.0) };
+            let way =
+                if face.is_some() { 0 } else { 1 + 2 * axis + usize::from(normal[axis] < 0.0) };
             Some((Piece { object: triangle.object, member: triangle.member, face, way }, place))
         })
     }

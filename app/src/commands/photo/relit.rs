@@ -5,9 +5,7 @@ use std::collections::BTreeMap;
 use glam::Vec3;
 use intrados_photo::{
     Located, Photograph,
-    relight::{
-        ReflectanceMap, RelightError, RelightSettings, Relit, RelitRecord, merged, relight,
-    },
+    relight::{ReflectanceMap, RelightError, RelightSettings, Relit, RelitRecord, merged, relight},
 };
 use intrados_stage::file::{Set, file_name};
 use serde::Serialize;
@@ -33,7 +31,8 @@ impl Kept {
         if self.pixels > MOST_KEPT {
             tracing::warn!(
                 "{photo}: its map of {} {} is not merged with others, they are too large together: choose more mm a pixel",
-                face[0], face[1]
+                face[0],
+                face[1]
             );
             self.pixels -= map.log_error.len();
             return;
@@ -125,8 +124,7 @@ impl Work<'_> {
         files.write(name, &png_of_deep_colours(size, &colours, &about)?)?;
         files.write(format!("{stem}_relit.pgw"), map.face.world_file().as_bytes())?;
         let share = |e: f32| (WHITE * e.clamp(0.0, 1.0)).round() as u16;
-        let errors: Vec<[u16; 3]> =
-            map.log_error.iter().map(|e| e.to_array().map(share)).collect();
+        let errors: Vec<[u16; 3]> = map.log_error.iter().map(|e| e.to_array().map(share)).collect();
         facts.push(("intrados.unit", "standard error of ln reflectance, 65535 is 1".into()));
         let name = format!("{stem}_relit_error.png");
         files.write(name, &png_of_deep_colours(size, &errors, &facts)?)
@@ -174,7 +172,8 @@ pub(super) fn lines(relit: &RelitRecord) -> String {
     for lamp in &relit.lamps {
         let value = |c: usize| format!("{:.3} ± {:.3}", lamp.strength[c], lamp.strength_error[c]);
         let names = lamp.lamps.join(" + ");
-        text += &format!("light of {names}: red {}, green {}, blue {}\n", value(0), value(1), value(2));
+        text +=
+            &format!("light of {names}: red {}, green {}, blue {}\n", value(0), value(1), value(2));
         if lamp.lamps.len() > 1 {
             text += "  (the photograph cannot tell these apart)\n";
         }

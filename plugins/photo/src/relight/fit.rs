@@ -69,8 +69,8 @@ impl Fit {
             }
             let residuals: Vec<[f64; 3]> = samples.iter().map(|s| fit.residuals(s)).collect();
             let scatter = std::array::from_fn(|c| deviation(residuals.iter().map(|r| r[c])));
-            let is_done = round > FIRST
-                && (0..3).all(|c| (scatter[c] / fit.scatter[c] - 1.0).abs() < 1e-5);
+            let is_done =
+                round > FIRST && (0..3).all(|c| (scatter[c] / fit.scatter[c] - 1.0).abs() < 1e-5);
             fit.scatter = scatter;
             for ((weight, sample), residual) in weights.iter_mut().zip(samples).zip(&residuals) {
                 let expected = fit.expected(sample);
@@ -161,12 +161,7 @@ impl Fit {
     }
 
     /// Slopes of log ŷ of one channel by all unknowns: those that are not 0.
-    pub(super) fn slopes(
-        &self,
-        light: &[[f64; 3]],
-        c: usize,
-        radius2: f64,
-    ) -> Vec<(usize, f64)> {
+    pub(super) fn slopes(&self, light: &[[f64; 3]], c: usize, radius2: f64) -> Vec<(usize, f64)> {
         let n = self.strength.len();
         let lit: f64 = self.strength.iter().zip(light).map(|(a, l)| a[c] * l[c]).sum();
         let v = vignetting(self.bends, radius2);
@@ -194,7 +189,8 @@ impl Fit {
         for (sample, weight) in samples.iter().zip(weights) {
             let (expected, residual) = (self.expected(sample), self.residuals(sample));
             for c in 0..3 {
-                let w = weight[c] * expected[c].powi(2) / self.scatter[c].max(LEAST_SCATTER).powi(2);
+                let w =
+                    weight[c] * expected[c].powi(2) / self.scatter[c].max(LEAST_SCATTER).powi(2);
                 if w > 0.0 && w.is_finite() {
                     let slopes = self.slopes(&sample.light, c, sample.radius2);
                     for (i, a) in &slopes {
@@ -264,9 +260,8 @@ mod tests {
             let damaged = (k % side < 12 && k / side < 36) as u32;
             let rho = (0.05 * key.normal(0)).exp() * 0.4_f64.powi(damaged as i32);
             let v = vignetting(bends, radius2);
-            let y = [0, 1, 2].map(|c| {
-                rho * v * (strength[0][c] * light[0][c] + strength[1][c] * light[1][c])
-            });
+            let y = [0, 1, 2]
+                .map(|c| rho * v * (strength[0][c] * light[0][c] + strength[1][c] * light[1][c]));
             Sample { y, light, radius2, tile: k % side / 10 + 6 * (k / side / 10) }
         };
         ((0..side * side).map(sample).collect(), strength, bends)

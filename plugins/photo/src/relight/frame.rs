@@ -151,7 +151,9 @@ impl Frame {
     ) -> Option<[f64; 6]> {
         let [x, y] = self.of_photo(at).map(|c| c - 0.5);
         let (mut sum, mut whole) = ([0.0; 6], 0.0);
-        for (i, j) in [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(i, j)| (x.floor() + i as f64, y.floor() + j as f64)) {
+        for (i, j) in [(0, 0), (1, 0), (0, 1), (1, 1)]
+            .map(|(i, j)| (x.floor() + i as f64, y.floor() + j as f64))
+        {
             let weight = (1.0 - (x - i).abs()) * (1.0 - (y - j).abs());
             let is_in = i >= 0.0 && j >= 0.0 && i < self.size[0] as f64 && j < self.size[1] as f64;
             if !is_in {

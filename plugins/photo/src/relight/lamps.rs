@@ -23,11 +23,8 @@ pub(super) struct Source {
 pub(super) fn of(scene: &Scene) -> Vec<Source> {
     let shines = |o: &Object| scene.materials[o.material].emission.max_element() > 0.0;
     let shining = scene.objects.iter().enumerate().filter(|(_, o)| shines(o));
-    let single = |(i, o): (usize, &Object)| Source {
-        name: o.name.clone(),
-        objects: vec![i],
-        beam: None,
-    };
+    let single =
+        |(i, o): (usize, &Object)| Source { name: o.name.clone(), objects: vec![i], beam: None };
     let mut sources: Vec<Source> = shining.map(single).collect();
     if sources.len() > MOST_SINGLE {
         sources = by_material(scene, sources);

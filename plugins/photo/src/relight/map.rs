@@ -84,9 +84,9 @@ impl Relit {
             return None;
         }
         let corners = [(-0.5, -0.5), (0.5, -0.5), (-0.5, 0.5), (0.5, 0.5)];
-        for at in corners.map(|(s, t)| {
-            [0, 1].map(|k| look.at[k] + s * look.sides[0][k] + t * look.sides[1][k])
-        }) {
+        for at in corners
+            .map(|(s, t)| [0, 1].map(|k| look.at[k] + s * look.sides[0][k] + t * look.sides[1][k]))
+        {
             let [x, y] = at.map(|c| c.max(0.0) as u32);
             photograph.light(x, y).filter(|light| is_exposed(*light))?;
         }

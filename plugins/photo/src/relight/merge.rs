@@ -59,7 +59,8 @@ pub fn merged(maps: &[ReflectanceMap]) -> Option<Merged> {
     loop {
         let shared = |i: usize| scale(&sums, size[0], &maps[i], offsets[i]);
         let open = (0..maps.len()).filter(|i| scales[*i].is_none());
-        let next = open.map(|i| (i, shared(i))).max_by_key(|(i, (n, _))| (*n, std::cmp::Reverse(*i)));
+        let next =
+            open.map(|i| (i, shared(i))).max_by_key(|(i, (n, _))| (*n, std::cmp::Reverse(*i)));
         let Some((i, (_, by))) = next.filter(|(_, (n, _))| *n >= OVERLAP) else { break };
         scales[i] = Some(by);
         add(&mut sums, size[0], &maps[i], offsets[i], by);
@@ -159,7 +160,13 @@ mod tests {
 
     /// A map of a planted pattern with noise, its corner moved by whole pixels, all of it times
     /// `scale`.
-    fn map(seed: u64, [right, down]: [i64; 2], size: [usize; 2], scale: f64, error: f64) -> ReflectanceMap {
+    fn map(
+        seed: u64,
+        [right, down]: [i64; 2],
+        size: [usize; 2],
+        scale: f64,
+        error: f64,
+    ) -> ReflectanceMap {
         let light = |k: usize| {
             let (x, y) = ((k % size[0]) as i64 + right, (k / size[0]) as i64 + down);
             let log = pattern(x, y) + error * Key::new(seed, k as u64).normal(0) + scale.ln();

@@ -286,10 +286,13 @@ fn samples(
 /// Share of light on members that was reflected on its way.
 fn reflected_share(frame: &Frame, groups: &[Group], pictures: &[Picture], fit: &Fit) -> f64 {
     let (mut reflected, mut all) = (0.0, 0.0);
-    for (k, _) in frame.shown.iter().enumerate().filter(|(_, s)| s.is_some_and(|s| s.piece.member.is_some())) {
+    for (k, _) in
+        frame.shown.iter().enumerate().filter(|(_, s)| s.is_some_and(|s| s.piece.member.is_some()))
+    {
         for (group, a) in groups.iter().zip(&fit.strength) {
             for c in 0..3 {
-                reflected += group.of.iter().map(|l| a[c] * pictures[*l].reflected[k][c]).sum::<f64>();
+                reflected +=
+                    group.of.iter().map(|l| a[c] * pictures[*l].reflected[k][c]).sum::<f64>();
                 all += group.of.iter().map(|l| a[c] * pictures[*l].field.mean[k][c]).sum::<f64>();
             }
         }
@@ -314,12 +317,14 @@ fn corrections(frame: &Frame, samples: &[Option<Sample>], fit: &Fit, objects: us
         let n = of.len();
         let most = MOST_CORRECTED.ln();
         let known = n >= CORRECTED;
-        known.then(|| (n as f64, of.select_nth_unstable_by(n / 2, f64::total_cmp).1.clamp(-most, most)))
+        known.then(|| {
+            (n as f64, of.select_nth_unstable_by(n / 2, f64::total_cmp).1.clamp(-most, most))
+        })
     };
-    let logs: Vec<[Option<(f64, f64)>; 3]> =
-        ratios.into_iter().map(|of| of.map(median)).collect();
+    let logs: Vec<[Option<(f64, f64)>; 3]> = ratios.into_iter().map(|of| of.map(median)).collect();
     let level: [f64; 3] = std::array::from_fn(|c| {
-        let (sum, n) = logs.iter().filter_map(|l| l[c]).fold((0.0, 0.0), |(s, m), (n, l)| (s + n * l, m + n));
+        let (sum, n) =
+            logs.iter().filter_map(|l| l[c]).fold((0.0, 0.0), |(s, m), (n, l)| (s + n * l, m + n));
         if n > 0.0 { sum / n } else { 0.0 }
     });
     let factor = |l: [Option<(f64, f64)>; 3]| {
@@ -342,7 +347,10 @@ fn expected(
     let lit: Vec<[f64; 3]> = light
         .iter()
         .map(|light| {
-            light.iter().zip(&fit.strength).fold([0.0; 3], |sum, (l, a)| [0, 1, 2].map(|c| sum[c] + a[c] * l[c]))
+            light
+                .iter()
+                .zip(&fit.strength)
+                .fold([0.0; 3], |sum, (l, a)| [0, 1, 2].map(|c| sum[c] + a[c] * l[c]))
         })
         .collect();
     let shadow = shadows(frame, &lit);
@@ -406,14 +414,14 @@ fn shifted(
     shadow_error_m: f64,
 ) -> [f64; 3] {
     let Some(shown) = frame.shown[k] else { return [0.0; 3] };
-    let pixels_m = located.pose.focal_px / located.pose.position.distance(shown.place) / frame.scale;
+    let pixels_m =
+        located.pose.focal_px / located.pose.position.distance(shown.place) / frame.scale;
     let reach = (shadow_error_m * pixels_m).min(24.0);
     let (mut moment, mut slope) = ([0.0_f64; 3], [[0.0_f64; 2]; 3]);
     let mut step = [0.0_f64; 3];
     for (q, [i, j]) in frame.around(k, (reach.ceil() as usize).max(1)) {
-        let log: [f64; 3] = [0, 1, 2].map(|c| {
-            if lit[q][c] > 0.0 { (lit[q][c] / lit[k][c]).ln() } else { 1.0 }
-        });
+        let log: [f64; 3] =
+            [0, 1, 2].map(|c| if lit[q][c] > 0.0 { (lit[q][c] / lit[k][c]).ln() } else { 1.0 });
         if i * i + j * j <= reach * reach {
             (0..3).for_each(|c| step[c] = step[c].max(log[c].abs()));
         }

@@ -43,7 +43,8 @@ impl Noise {
         for k in (0..quads).step_by(every) {
             let columns = width as usize / 2;
             let (x, y) = (2 * (k % columns) as u32, 2 * (k / columns) as u32);
-            let four = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(i, j)| photograph.light(x + i, y + j));
+            let four =
+                [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(i, j)| photograph.light(x + i, y + j));
             let [Some(a), Some(b), Some(c), Some(d)] = four else { continue };
             if ![a, b, c, d].into_iter().all(is_exposed) {
                 continue;

@@ -69,8 +69,6 @@ fn picture(render: &Render, frame: &Frame, light: Light) -> Picture {
         Light::All => doubles(&all.mean),
         Light::Direct => doubles(&direct),
     };
-    // Of a walk that has found no light yet nothing is known to be 0: as much as one in so many
-    // may bring.
     let variance = doubles(&all.variance);
     let field = smoothed(frame, &Field { mean, variance });
     Picture { field, reflected: doubles(&reflected) }
