@@ -969,6 +969,20 @@ pub(crate) struct Photo {
     /// Standard error of a pick, pixels
     #[arg(long, value_name = "PX", default_value_t = 2.0, value_parser = picking_px)]
     pub(crate) picking_px: f64,
+    /// Take the light off: maps of the faces' reflectance, with their errors, by the scene's lamps
+    /// however brightly each burnt
+    #[arg(long)]
+    pub(crate) relight: bool,
+    /// Walks a lamp and pixel of the pictures of light, which are 256 pixels wide
+    #[arg(long, value_name = "N", default_value_t = 64, requires = "relight", value_parser = value_parser!(u64).range(2..=1 << 20))]
+    pub(crate) spp: u64,
+    /// Standard error of where shadows lie on the faces, mm: lamps and edges are not quite where
+    /// the scene has them
+    #[arg(long, value_name = "MM", default_value_t = 20.0, requires = "relight", value_parser = shadow_error_mm)]
+    pub(crate) shadow_error_mm: f64,
+    /// Seed of the walks
+    #[arg(long, value_name = "N", default_value_t = 1, requires = "relight")]
+    pub(crate) seed: u64,
     /// Folder for the files
     #[arg(long, value_name = "DIR", default_value = "out")]
     pub(crate) out: PathBuf,
@@ -985,6 +999,10 @@ fn mm_per_px(text: &str) -> Result<f64, String> {
 
 fn focal_px(text: &str) -> Result<f64, String> {
     between(text, 10.0, 1e6, "pixels")
+}
+
+fn shadow_error_mm(text: &str) -> Result<f64, String> {
+    between(text, 0.0, 1000.0, "mm")
 }
 
 fn picking_px(text: &str) -> Result<f64, String> {

@@ -68,9 +68,28 @@ pub(crate) fn png_of_colours(
     encode_png(size, colours.as_flattened(), facts)
 }
 
+/// Colours of sixteen bits as PNG.
+pub(crate) fn png_of_deep_colours(
+    size: [u32; 2],
+    colours: &[[u16; 3]],
+    facts: &Facts,
+) -> Result<Vec<u8>, Failure> {
+    let bytes: Vec<u8> = colours.as_flattened().iter().flat_map(|v| v.to_be_bytes()).collect();
+    encode_deep_png(size, &bytes, png::BitDepth::Sixteen, facts)
+}
+
 fn encode_png(size: [u32; 2], pixels: &[u8], facts: &Facts) -> Result<Vec<u8>, Failure> {
+    encode_deep_png(size, pixels, png::BitDepth::Eight, facts)
+}
+
+fn encode_deep_png(
+    size: [u32; 2],
+    pixels: &[u8],
+    depth: png::BitDepth,
+    facts: &Facts,
+) -> Result<Vec<u8>, Failure> {
     let mut bytes = Vec::new();
-    write_png(&mut bytes, size, pixels, facts)
+    write_png(&mut bytes, size, pixels, depth, facts)
         .map_err(|e| Failure::Internal(format!("cannot make a PNG: {e}")))?;
     Ok(bytes)
 }
@@ -79,11 +98,12 @@ fn write_png(
     bytes: &mut Vec<u8>,
     [width, height]: [u32; 2],
     pixels: &[u8],
+    depth: png::BitDepth,
     facts: &Facts,
 ) -> Result<(), png::EncodingError> {
     let mut encoder = png::Encoder::new(bytes, width, height);
     encoder.set_color(png::ColorType::Rgb);
-    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_depth(depth);
     encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
     encoder.add_itxt_chunk(
         "Software".into(),

@@ -1,5 +1,5 @@
-//! A photograph of the bundled column, rendered through a lens: placed by its corners, and its faces
-//! unrolled.
+//! A photograph of the bundled column, rendered through a lens: placed by its corners, its faces
+//! unrolled, and the light taken off.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -124,8 +124,9 @@ fn a_photograph_is_placed_and_its_faces_unrolled() {
     let focal = planted.focal_px.to_string();
     let call = |csv: &Path, out: &Path| {
         let how = ["--picking-px", "0.5", "--member", "C2", "--mm-per-px", "2", "--format", "json"];
+        let relight = ["--relight", "--spp", "8"];
         let what = ["photo", model, text(&photo), "--pose", text(csv), "--focal-px", &focal];
-        run(&[&what[..], &how[..], &["--out", text(out)]].concat())
+        run(&[&what[..], &how[..], &relight[..], &["--out", text(out)]].concat())
     };
     let said = call(&csv, &maps);
     assert!(said.status.success(), "{}", String::from_utf8_lossy(&said.stderr));
@@ -154,6 +155,23 @@ fn a_photograph_is_placed_and_its_faces_unrolled() {
             assert!(off < 1.0, "mark {mark}: {at:?}, found at {found:?}");
         }
     }
+    // The light is the sky's, blue; the concrete is grey, and so is its map without the light.
+    let relit = &said["photos"][0]["relit"];
+    let names: Vec<_> = relit["lamps"].as_array().unwrap().iter().map(|l| &l["lamps"][0]).collect();
+    assert_eq!(names, ["lamp", "back lamp", "sky"], "{relit}");
+    let record = faces.iter().find(|f| f["face"] == "Front").unwrap();
+    assert!(record["relit_known"].as_f64().unwrap() > 0.5, "{record}");
+    let [lit, grey] = ["", "_relit"].map(|what| {
+        let file = maps.join(format!("marked.png_C2_Front{what}.png"));
+        let map = image::open(file).unwrap().to_rgb32f();
+        let known = map.pixels().filter(|p| p.0.iter().all(|v| *v > 0.0));
+        let [red, blue] = [0, 2].map(|c| {
+            known.clone().map(|p| f64::from(intrados_photo::picture::linear(p[c]))).sum::<f64>()
+        });
+        blue / red
+    });
+    assert!(lit > 1.2 && (0.88..1.0).contains(&grey), "{lit} {grey}");
+
     for file in said["files"].as_array().unwrap() {
         assert!(Path::new(file.as_str().unwrap()).exists(), "{file}");
     }

@@ -1,5 +1,7 @@
 //! `intrados photo`: where photographs were taken from, and the faces that they show, unrolled.
 
+mod relit;
+
 use std::{collections::BTreeSet, path::Path};
 
 use glam::DVec3;
@@ -9,6 +11,7 @@ use intrados_photo::{
     picks::{self, PickedIn},
     picture::srgb,
     record::{FaceRecord, PoseRecord},
+    relight::RelitRecord,
     series::{PlacedSeries, Series},
     taken::{Focal, Taken},
     unrolled,
@@ -25,6 +28,7 @@ use crate::{
     picture::{Facts, png_of_colours},
     session::{Session, one_line},
 };
+use relit::{Kept, MergedFace};
 
 /// Standard error of k1 before anything is picked: barrels of zooms at their wide end reach some
 /// −.1, and cameras that correct their pictures are near 0 (ours).
@@ -41,6 +45,9 @@ struct Report {
     /// Standard error of a pick that was stated, pixels.
     picking_px: f64,
     photos: Vec<Placed>,
+    /// Faces that several photographs show.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    merged: Vec<MergedFace>,
     unused: Vec<Unused>,
     files: Vec<String>,
 }
@@ -56,6 +63,12 @@ struct Placed {
     notes: Vec<String>,
     pose: PoseRecord,
     faces: Vec<FaceRecord>,
+    /// What was fitted to take the light off.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    relit: Option<RelitRecord>,
+    /// Why the light stays.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    not_relit: Option<String>,
 }
 
 /// A photograph that was not.
@@ -121,13 +134,15 @@ pub(crate) fn run(session: &Session, args: &args::Photo) -> Result<Outcome, Fail
         scene_hash: work.scene.hash.clone(),
         picking_px: args.picking_px,
         photos: Vec::new(),
+        merged: Vec::new(),
         unused: Vec::new(),
         files: Vec::new(),
     };
     let mut first = None;
+    let mut kept = Kept::default();
     for ((file, name), stem) in args.files.iter().zip(&names).zip(file_names(&names)) {
         let _progress = session.watch(format!("placing {name}"));
-        match work.place(file, name, &stem, &mut files) {
+        match work.place(file, name, &stem, &mut files, &mut kept) {
             Ok(placed) => report.photos.push(placed),
             Err(failure @ (Failure::BadInput(_) | Failure::NoInput(_))) => {
                 let because = one_line(&failure.to_string());
@@ -143,6 +158,7 @@ pub(crate) fn run(session: &Session, args: &args::Photo) -> Result<Outcome, Fail
     if let (true, Some(failure)) = (report.photos.is_empty(), first) {
         return Err(failure);
     }
+    report.merged = work.merge(&kept, &mut files)?;
     report.files = files.listed(LIST);
     files.finish(LIST, &report)?;
     session.print(&report, || report.table())?;
@@ -198,6 +214,7 @@ impl Work<'_> {
         name: &str,
         stem: &str,
         files: &mut Set,
+        kept: &mut Kept,
     ) -> Result<Placed, Failure> {
         let bad = |why: &dyn std::fmt::Display| format!("{}: {why}", file.display());
         let photograph = Photograph::open(file).map_err(|error| match error.is_missing() {
@@ -228,6 +245,8 @@ impl Work<'_> {
             format!("{stem}_overlay.png"),
             &png_of_colours(overlay.size, overlay.rgb.as_chunks().0, &self.facts(name))?,
         )?;
+        let shot = (&photograph, &located);
+        let (relit, not_relit) = self.relight(name, shot)?;
         let mut faces = Vec::new();
         for seen in seen.iter().filter(|seen| self.member.is_none_or(|m| m == seen.member)) {
             let Some(surface) = self.site.surface(seen.member) else { continue };
@@ -241,8 +260,17 @@ impl Work<'_> {
                 &self.session.job,
             )?;
             let error = self.site.error(&located, &seen.middle);
-            self.write(files, &map, &format!("{stem}_{}_{}", file_name(id), seen.face.name), name)?;
-            faces.push(FaceRecord::new([id, &seen.face.name], &seen.middle, error, &map));
+            let stem = format!("{stem}_{}_{}", file_name(id), seen.face.name);
+            self.write(files, &map, &stem, name)?;
+            let mut record = FaceRecord::new([id, &seen.face.name], &seen.middle, error, &map);
+            if let Some(relit) = &relit {
+                let job = &self.session.job;
+                let map = relit.map(&self.site, seen, shot, self.args.mm_per_px, job)?;
+                self.write_relit(files, &map, &stem, name)?;
+                record = record.relit(&map);
+                kept.keep([id, &seen.face.name], name, map);
+            }
+            faces.push(record);
         }
         Ok(Placed {
             file: file.display().to_string(),
@@ -252,6 +280,8 @@ impl Work<'_> {
             notes: photograph.notes.clone(),
             pose: PoseRecord::new(&located, &picks),
             faces,
+            relit: relit.as_ref().map(intrados_photo::relight::Relit::record),
+            not_relit,
         })
     }
 
@@ -343,7 +373,9 @@ impl Report {
                 pose.picks.len(),
             );
             text += &output::table(&rows(&photo.faces));
+            photo.relit.iter().for_each(|relit| text += &relit::lines(relit));
         }
+        self.merged.iter().for_each(|merged| text += &merged.line());
         self.unused.iter().for_each(|u| text += &format!("not used, because {}\n", u.because));
         self.files.iter().for_each(|f| text += &format!("file {f}\n"));
         text
@@ -354,6 +386,10 @@ fn rows(faces: &[FaceRecord]) -> Vec<Vec<String>> {
     let head =
         ["member", "face", "distance m", "oblique deg", "mm/px", "place ± mm", "map px", "known"];
     let mut rows = vec![head.map(String::from).to_vec()];
+    let is_relit = faces.iter().any(|face| face.relit_known.is_some());
+    if is_relit {
+        rows[0].extend(["relit", "reflectance ±"].map(String::from));
+    }
     for face in faces {
         let [around, along] = face.photo_mm_px;
         rows.push(vec![
@@ -366,6 +402,10 @@ fn rows(faces: &[FaceRecord]) -> Vec<Vec<String>> {
             format!("{} × {}", face.map_size[0], face.map_size[1]),
             format!("{:.0} %", 100.0 * face.known),
         ]);
+        if let (Some(row), Some(known)) = (rows.last_mut(), face.relit_known) {
+            let error = face.relit_log_error.map_or("-".into(), |e| format!("{:.1} %", 100.0 * e));
+            row.extend([format!("{:.0} %", 100.0 * known), error]);
+        }
     }
     rows
 }

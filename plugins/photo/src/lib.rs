@@ -9,6 +9,7 @@ pub mod picks;
 pub mod picture;
 pub mod pose;
 pub mod record;
+pub mod relight;
 pub mod series;
 mod similarity;
 pub mod site;

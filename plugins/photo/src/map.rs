@@ -76,6 +76,15 @@ impl FaceMap {
     }
 }
 
+/// Where a pixel of a map is looked up in a photograph.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Look {
+    /// Its middle, pixels.
+    pub(crate) at: [f64; 2],
+    /// Its sides across and along, pixels.
+    pub(crate) sides: [[f64; 2]; 2],
+}
+
 /// The light of a face in a photograph, at `mm_px` millimetres a pixel.
 ///
 /// # Errors
@@ -88,6 +97,22 @@ pub fn unrolled(
     mm_px: f64,
     job: &Job,
 ) -> Result<FaceMap, MapError> {
+    let light = |look: &Look| sample(photograph, look);
+    let (size, light) = resampled(site, surface, face, pose, mm_px, job, light)?;
+    Ok(FaceMap { size, mm_px, corner: [face.across[0], face.along[1]], light })
+}
+
+/// What `of` finds at each pixel of a face's map, by rows from the far end of the axis, where the
+/// camera sees it; and the map's pixels across and along.
+pub(crate) fn resampled<T: Clone + Send>(
+    site: &Site,
+    surface: &Surface,
+    face: &Face,
+    pose: &Pose,
+    mm_px: f64,
+    job: &Job,
+    of: impl Fn(&Look) -> Option<T> + Sync,
+) -> Result<([usize; 2], Vec<Option<T>>), MapError> {
     let m = 1e-3 * mm_px;
     // A face of 200 pixels and rounding has 200.
     let pixels = |[from, to]: [f64; 2]| ((to - from) / m - 1e-3).ceil().max(1.0);
@@ -109,17 +134,20 @@ pub fn unrolled(
         let mut scratch = Scratch::default();
         let spots = surface.spots(face, &at, &mut scratch);
         let seen = seen(site, pose, &spots, &mut scratch);
-        let light = |(spot, seen): (&Option<Spot>, bool)| {
+        let found = |(spot, seen): (&Option<Spot>, bool)| {
             let spot = spot.as_ref().filter(|_| seen)?;
-            sample(photograph, pose, spot.place.as_dvec3(), surface.tangents(spot.normal), m)
+            let place = spot.place.as_dvec3();
+            let (at, slopes) = (pose.project(place)?, pose.slopes_by_place(place)?);
+            let side = |t: DVec3| [slopes[0].dot(t) * m, slopes[1].dot(t) * m];
+            of(&Look { at, sides: surface.tangents(spot.normal).map(side) })
         };
-        spots.iter().zip(seen).map(light).collect::<Vec<_>>()
+        spots.iter().zip(seen).map(found).collect::<Vec<_>>()
     };
-    let light: Vec<Option<Vec3>> = (0..size[1]).into_par_iter().flat_map_iter(row).collect();
+    let found: Vec<Option<T>> = (0..size[1]).into_par_iter().flat_map_iter(row).collect();
     if job.is_cancelled() {
         return Err(Cancelled.into());
     }
-    Ok(FaceMap { size, mm_px, corner, light })
+    Ok((size, found))
 }
 
 /// Which spots the camera sees: in its picture, not too flat, and nothing between.
@@ -142,24 +170,16 @@ fn seen(site: &Site, pose: &Pose, spots: &[Option<Spot>], scratch: &mut Scratch)
     rays.iter().map(|ray| ray.is_some() && clear.next() == Some(true)).collect()
 }
 
-/// Mean light over a square of `m` metres on the surface.
-fn sample(
-    photograph: &Photograph,
-    pose: &Pose,
-    place: DVec3,
-    tangents: [DVec3; 2],
-    m: f64,
-) -> Option<Vec3> {
-    let at = pose.project(place)?;
-    let slopes = pose.slopes_by_place(place)?;
-    let step = tangents.map(|t| [slopes[0].dot(t) * m, slopes[1].dot(t) * m]);
-    let counts = step.map(|[x, y]| x.hypot(y).ceil().clamp(1.0, MOST_AVERAGED) as u32);
+/// Mean light over a pixel of the map.
+pub(crate) fn sample(photograph: &Photograph, Look { at, sides }: &Look) -> Option<Vec3> {
+    let counts = sides.map(|[x, y]| x.hypot(y).ceil().clamp(1.0, MOST_AVERAGED) as u32);
     let share = |k: u32, of: u32| (f64::from(k) + 0.5) / f64::from(of) - 0.5;
     let mut sum = Vec3::ZERO;
     for i in 0..counts[0] {
         for j in 0..counts[1] {
             let (s, t) = (share(i, counts[0]), share(j, counts[1]));
-            sum += photograph.light_at([0, 1].map(|k| at[k] + s * step[0][k] + t * step[1][k]))?;
+            sum +=
+                photograph.light_at([0, 1].map(|k| at[k] + s * sides[0][k] + t * sides[1][k]))?;
         }
     }
     Some(sum / (counts[0] * counts[1]) as f32)

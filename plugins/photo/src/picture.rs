@@ -134,6 +134,11 @@ impl Photograph {
         Ok(Self { size, taken, notes, samples, linear })
     }
 
+    /// Steps of a value in the file from black to white.
+    pub(crate) fn steps(&self) -> f64 {
+        (self.linear.len() - 1) as f64
+    }
+
     /// Linear light of the pixel in column `x` and row `y`, red, green and blue, 1 where it is
     /// burnt out. `None` outside.
     #[must_use]

@@ -2,7 +2,9 @@
 
 use serde::Serialize;
 
-use crate::{Located, Pick, pose::UNKNOWNS, site::Sight, site::SightError};
+use crate::{
+    Located, Pick, pose::UNKNOWNS, relight::ReflectanceMap, site::Sight, site::SightError,
+};
 
 /// A pose with its errors.
 #[derive(Debug, Clone, Serialize)]
@@ -77,6 +79,10 @@ pub struct FaceRecord {
     pub map_corner_m: [f64; 2],
     /// Share of the map that is known.
     pub known: f64,
+    /// Share of the map of reflectance that is known; `None` where the light was not taken off.
+    pub relit_known: Option<f64>,
+    /// Median standard error of the logarithm of reflectance, green.
+    pub relit_log_error: Option<f64>,
 }
 
 impl PoseRecord {
@@ -132,6 +138,18 @@ impl FaceRecord {
             map_size: map.size,
             map_corner_m: map.corner,
             known: map.known(),
+            relit_known: None,
+            relit_log_error: None,
+        }
+    }
+
+    /// The same with the map of reflectance.
+    #[must_use]
+    pub fn relit(self, map: &ReflectanceMap) -> Self {
+        Self {
+            relit_known: Some(map.face.known()),
+            relit_log_error: map.median_log_error().map(f64::from),
+            ..self
         }
     }
 }

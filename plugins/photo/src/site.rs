@@ -37,7 +37,21 @@ pub struct Site {
 #[derive(Debug, Clone, Copy)]
 struct Triangle {
     corners: [Vec3; 3],
+    object: u32,
     member: Option<usize>,
+}
+
+/// A piece of surface that is smooth: a face of a member, or what of another object looks one way.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Piece {
+    /// Index of the object.
+    pub(crate) object: u32,
+    /// Index of the member.
+    pub(crate) member: Option<usize>,
+    /// Index of the member's face.
+    pub(crate) face: Option<usize>,
+    /// Of what is no member's face: to which side of the world's axes it looks.
+    way: usize,
 }
 
 /// What a pixel shows of a member.
@@ -89,10 +103,10 @@ impl Site {
     /// # Errors
     /// [`Cancelled`] if the job is.
     pub fn new(scene: &Scene, job: &Job) -> Result<Self, Cancelled> {
-        let seen =
-            scene.objects.iter().filter(|o| matches!(o.part, Part::Concrete | Part::Scenery));
+        let objects = (0..).zip(&scene.objects);
+        let seen = objects.filter(|(_, o)| matches!(o.part, Part::Concrete | Part::Scenery));
         let triangles: Vec<Triangle> = seen
-            .flat_map(|object| {
+            .flat_map(|(index, object)| {
                 let mesh = &scene.meshes[object.mesh];
                 let member = object.member.filter(|_| object.part == Part::Concrete);
                 let is_mirrored = object.transform.determinant() < 0.0;
@@ -101,7 +115,7 @@ impl Site {
                     if is_mirrored {
                         corners.swap(1, 2);
                     }
-                    Triangle { corners, member }
+                    Triangle { corners, object: index, member }
                 })
             })
             .collect();
@@ -155,6 +169,16 @@ impl Site {
     /// What places in a picture show; `None` where that is no member.
     #[must_use]
     pub fn sights(&self, pose: &Pose, pixels: &[[f64; 2]]) -> Vec<Option<Sight>> {
+        self.looked(pose, pixels, |ray, hit| self.sight(pose, ray, hit))
+    }
+
+    /// What `of` makes of the ray through each place in a picture and of what it meets.
+    fn looked<T>(
+        &self,
+        pose: &Pose,
+        pixels: &[[f64; 2]],
+        of: impl Fn(&Ray, Hit) -> Option<T>,
+    ) -> Vec<Option<T>> {
         let ray = |pixel: &[f64; 2]| {
             // A ray without direction meets nothing.
             let way = pose.ray(*pixel).unwrap_or(DVec3::ZERO).as_vec3();
@@ -163,7 +187,29 @@ impl Site {
         let rays: Vec<Ray> = pixels.iter().map(ray).collect();
         let mut hits = vec![Hit::MISS; rays.len()];
         self.tracer.closest(&rays, &mut hits, &mut Scratch::default());
-        rays.iter().zip(&hits).map(|(ray, hit)| self.sight(pose, ray, *hit)).collect()
+        rays.iter().zip(&hits).map(|(ray, hit)| of(ray, *hit)).collect()
+    }
+
+    /// What piece of surface pixels show, and where; `None` where it is nothing or flatter than
+    /// 10°.
+    pub(crate) fn pieces(&self, pose: &Pose, pixels: &[[f64; 2]]) -> Vec<Option<(Piece, DVec3)>> {
+        self.looked(pose, pixels, |ray, hit| {
+            let triangle = self.triangles.get(hit.triangle as usize)?;
+            let place = offset::hit_point(&triangle.corners, ray).0.as_dvec3();
+            let to_camera = (pose.position - place).normalize();
+            let outward = normal(&triangle.corners);
+            let normal = if outward.dot(to_camera) < 0.0 { -outward } else { outward };
+            if normal.dot(to_camera) < FLATTEST {
+                return None;
+            }
+            let surface = triangle.member.and_then(|member| self.surface(member));
+            let face = surface.and_then(|surface| surface.face_of(place, normal));
+            let size = normal.abs();
+            let axis = (0..3).max_by(|a, b| size[*a].total_cmp(&size[*b])).unwrap_or(0);
+            let way =
+                if face.is_some() { 0 } else { 1 + 2 * axis + usize::from(normal[axis] < 0.0) };
+            Some((Piece { object: triangle.object, member: triangle.member, face, way }, place))
+        })
     }
 
     fn sight(&self, pose: &Pose, ray: &Ray, hit: Hit) -> Option<Sight> {
