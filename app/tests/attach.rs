@@ -391,9 +391,8 @@ fn volumes_are_attached_and_taken_away() {
     let copy = fs::read(place.path("bridge/evidence/C1_core_1/core.mha")).unwrap();
     let head = String::from_utf8_lossy(&copy[..240]).into_owned();
     assert!(head.contains("ElementSpacing = 2 2 4\nDimSize = 32 24 20\n"), "{head}");
-    assert!(
-        head.contains("MSB = True") && copy.ends_with(&[0, 100 + (32 * 24 * 20 - 1) as u8 % 7])
-    );
+    let last = 100 + ((32 * 24 * 20 - 1) % 7) as u8;
+    assert!(head.contains("MSB = True") && copy.ends_with(&[0, last]));
     // The copy is a volume as any other.
     let mha = text(&place.path("bridge/evidence/C1_core_1/core.mha")).to_owned();
     place.refuses("attach", &["C1", &mha, "--along", "0.3"], 65, &["20 slices", "--stack"]);

@@ -94,7 +94,7 @@ fn member(structure: &Structure, m: &Member) -> MemberBasis {
     sides.sort_by(f32::total_cmp);
     let volume = if m.volume > 0.0 { format!(", {:.2} m³", m.volume) } else { String::new() };
     let mut assumed = Vec::new();
-    if m.concrete_assumed && assembly.is_none_or(|a| a.matter.is_none()) {
+    if m.concrete_assumed {
         assumed.push("concrete");
     }
     if assembly.is_some_and(|a| a.steel_assumed) {
@@ -109,9 +109,10 @@ fn member(structure: &Structure, m: &Member) -> MemberBasis {
         id: m.id.clone(),
         length_m,
         size: format!("{length_m:.2} m long, box {:.2} × {:.2} m{volume}", sides[0], sides[1]),
-        concrete: assembly
-            .and_then(|a| a.matter.as_ref())
-            .map_or_else(|| m.concrete.clone(), |matter| matter.name.clone()),
+        concrete: assembly.and_then(|a| a.matter.as_ref()).map_or_else(
+            || m.concrete.clone(),
+            |matter| format!("{}, computed as {}", matter.name, m.concrete),
+        ),
         steel: assembly.map_or_else(|| "none known".into(), steel),
         exposure: m
             .exposure

@@ -229,12 +229,6 @@ pub fn forecast(
     settings: ForecastSettings,
     job: &Job,
 ) -> Result<Vec<Forecast>, ForecastError> {
-    if let Some(matter) = scene.structure.assembly(model).and_then(|a| a.matter.as_ref()) {
-        return Err(ForecastError::Because(format!(
-            "it is of {}, and of concrete alone anything is foretold",
-            matter.name
-        )));
-    }
     let mut prepared = prepared(scene, model, handed, settings, job)?;
     let now = prepared.times.last().copied().unwrap_or(0.0);
     prepared.times.push(now + settings.ahead_years * YEAR);

@@ -15,7 +15,7 @@ use std::{
 };
 
 use intrados_mechanics::{frame, member::Handed};
-use intrados_scene::{Assembly, Damage, Member, MemberKind, Scene};
+use intrados_scene::{Assembly, Damage, Member, MemberKind, Scene, structure::Matter};
 use intrados_stage::{Cancelled, Estimate, Job, file::Set};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -903,8 +903,8 @@ impl Predictor {
             id: member.id.clone(),
             name: member.name.clone(),
             kind: member.kind,
-            concrete: matter.map_or(&member.concrete, |m| &m.name).clone(),
-            concrete_assumed: member.concrete_assumed && matter.is_none(),
+            concrete: of_what(&member.concrete, matter),
+            concrete_assumed: member.concrete_assumed,
             damage: damage.map(|d| d.value),
             damage_std_error: damage.map(|d| d.std_error),
             state: verdict.state,
@@ -1279,4 +1279,11 @@ pub fn predict(
     while predictor.advance(scene, job)? {}
     job.step(1, 1)?;
     Ok(predictor.finish(scene))
+}
+/// What a member is of, for people.
+fn of_what(concrete: &str, matter: Option<&Matter>) -> String {
+    match matter {
+        Some(matter) => format!("{}, computed as {concrete}", matter.name),
+        None => concrete.to_owned(),
+    }
 }

@@ -131,17 +131,12 @@ pub fn surveyed(
 ) -> Result<Surveyed, ForecastError> {
     let member = &scene.members[index];
     let all: Vec<(usize, &Observation)> = of_member(scene, &member.id).collect();
-    let model = scene.structure.assembly_of(&member.id);
-    if let Some(matter) = model.and_then(|a| a.matter.as_ref()) {
-        let why = "and what instruments and eyes tell is weighed for concrete alone";
-        return Err(ForecastError::Because(format!("the member is of {}, {why}", matter.name)));
-    }
     let mut said = Said::default();
     said.unused.extend(all.iter().filter_map(|(number, o)| Some((*number, refusal(o)?))));
     let placed = placed(&all);
     let mut site = Site::new(scene, index);
     if placed.iter().any(|p| rust::speaks(p.shows)) {
-        let model = model.map_or(&member.id, |a| &a.id);
+        let model = scene.structure.assembly_of(&member.id).map_or(&member.id, |a| &a.id);
         match forecast::bars_of(scene, model, &profile.rule, job) {
             Ok(known) => site.take(known, &member.id),
             Err(ForecastError::Cancelled) => return Err(ForecastError::Cancelled),

@@ -2,7 +2,7 @@
 
 use intrados_scene::{
     Assembly, Scene,
-    structure::{ASSUMED_CONCRETE, Body as Shape, Cement as Written, GroundModel, Matter as Other},
+    structure::{ASSUMED_CONCRETE, Body as Shape, Cement as Written, GroundModel},
 };
 
 use super::{
@@ -101,9 +101,6 @@ impl Draft<'_> {
             None => self.member.pours.first(),
         };
         let birth = pour.map_or(0.0, |p| f64::from(p.at_days) * DAY);
-        if let Some(matter) = &self.member.matter {
-            return Ok(Body { matter: Matter::Elastic(elastic(matter)), birth });
-        }
         Ok(Body { matter: self.concrete(class)?, birth })
     }
 
@@ -163,22 +160,17 @@ impl Draft<'_> {
 /// Expansion of what is no concrete, 1/K (that of steel and concrete; wood has half of it).
 const EXPANSION: f64 = 1e-5;
 
-/// What is no concrete: elastic for ever.
-fn elastic(matter: &Other) -> Elastic {
-    Elastic {
+/// What a member of the whole bears by. What is no concrete never cracks.
+pub(crate) fn bearing(scene: &Scene, assembly: &Assembly) -> Result<Properties, Error> {
+    let Some(matter) = &assembly.matter else { return properties(scene, &assembly.concrete) };
+    Ok(Properties {
         modulus: 1e9 * f64::from(matter.modulus_gpa),
         poisson: f64::from(matter.poisson),
         expansion: EXPANSION,
         density: f64::from(matter.density_kg_m3),
-    }
-}
-
-/// What a member of the whole bears by. What is no concrete never cracks.
-pub(crate) fn bearing(scene: &Scene, assembly: &Assembly) -> Result<Properties, Error> {
-    let Some(matter) = &assembly.matter else { return properties(scene, &assembly.concrete) };
-    let Elastic { modulus, poisson, expansion, density } = elastic(matter);
-    let usual = properties(scene, ASSUMED_CONCRETE)?;
-    Ok(Properties { modulus, poisson, expansion, density, fctm: f64::INFINITY, ..usual })
+        fctm: f64::INFINITY,
+        ..properties(scene, ASSUMED_CONCRETE)?
+    })
 }
 
 /// All that is known and assumed of a concrete by its name.

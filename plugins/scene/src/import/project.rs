@@ -106,22 +106,18 @@ fn detail<'a>(found: &'a Found, year: Option<i32>, told: &Told) -> Detail<'a> {
         Some(Concrete::Class(class)) => (class.clone(), None),
         Some(Concrete::Strength(mpa)) => (format!("fck {mpa} MPa"), Some(*mpa)),
         None => {
-            if found.other.is_none() {
-                assumed.push(Assumed::Concrete);
-            }
+            assumed.push(Assumed::Concrete);
             (assume::concrete(year).to_owned(), None)
         }
     };
     let exposure = found.exposure.clone().or(told.exposure.clone()).unwrap_or_else(|| {
-        if found.other.is_none() {
-            assumed.push(Assumed::Exposure);
-        }
+        assumed.push(Assumed::Exposure);
         assume::exposure(found.kind).to_owned()
     });
     let years = year.and_then(|y| {
         (i32::try_from(this_year()).ok()? >= y).then_some(this_year() as f32 - y as f32)
     });
-    if years.is_none() && found.other.is_none() {
+    if years.is_none() {
         assumed.push(Assumed::Age);
     }
     let fck = strength.or(concrete_class(&concrete)).unwrap_or(30.0);
@@ -249,11 +245,8 @@ fn loads(members: &[Detail], told: &Told) -> String {
 }
 
 fn concretes(members: &[Detail]) -> String {
-    let own: BTreeMap<&str, f32> = members
-        .iter()
-        .filter(|m| m.found.other.is_none())
-        .filter_map(|m| Some((m.concrete.as_str(), m.strength?)))
-        .collect();
+    let own: BTreeMap<&str, f32> =
+        members.iter().filter_map(|m| Some((m.concrete.as_str(), m.strength?))).collect();
     if own.is_empty() {
         return String::new();
     }
@@ -275,25 +268,24 @@ fn detail_text(member: &Detail) -> String {
         found.volume,
         if found.steel > 0 { format!(", {} bars", found.steel) } else { String::new() }
     );
-    let _ = match &found.other {
-        Some(matter) => write!(
+    let _ = write!(
+        text,
+        "        (member: {}, concrete: {}, exposure: (class: {}, years: {})",
+        quoted(&found.id),
+        quoted(&member.concrete),
+        quoted(&member.exposure),
+        member.years
+    );
+    if let Some(matter) = &found.other {
+        let _ = write!(
             text,
-            "        (member: {}, matter: (name: {}, modulus_gpa: {}, poisson: {}, density_kg_m3: {})",
-            quoted(&found.id),
+            ",\n            matter: (name: {}, modulus_gpa: {}, poisson: {}, density_kg_m3: {})",
             quoted(&matter.name),
             matter.modulus_gpa,
             matter.poisson,
             matter.density_kg_m3
-        ),
-        None => write!(
-            text,
-            "        (member: {}, concrete: {}, exposure: (class: {}, years: {})",
-            quoted(&found.id),
-            quoted(&member.concrete),
-            quoted(&member.exposure),
-            member.years
-        ),
-    };
+        );
+    }
     if let Some(tube) = &found.tube {
         let (thickness, length) = (tube.outer - tube.inner, tube.axis.length());
         let laid =
@@ -514,7 +506,7 @@ fn summary(folder: &Path, source: &Source, built: &Built, members: &[Detail]) ->
         });
     for (count, matter) in others.into_values() {
         notes.push(format!(
-            "{count} members are of {}, which is no concrete: they bear with E = {} GPa and {} kg/m³, and nothing is foretold of them",
+            "{count} members are of {}, which is no concrete: in the whole they bear with E = {} GPa and {} kg/m³, but each by itself is computed as concrete all the same",
             matter.name, matter.modulus_gpa, matter.density_kg_m3
         ));
     }

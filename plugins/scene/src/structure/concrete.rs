@@ -3,7 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// What a member is of that is no concrete. It bears by these; nothing is foretold of it.
+/// What a member is of that is no concrete. In the whole structure it bears by these; by itself it
+/// is computed as concrete all the same, and that is said.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Matter {

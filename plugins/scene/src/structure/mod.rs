@@ -85,7 +85,7 @@ pub struct Assembly {
     pub concrete: String,
     /// Whether it had to be assumed.
     pub concrete_assumed: bool,
-    /// What it is of where that is no concrete; `concrete` says nothing then.
+    /// What it is of where that is no concrete.
     pub matter: Option<Matter>,
     /// When its parts were poured. One pour at day 0 where there is none.
     pub pours: Vec<Pour>,
