@@ -391,9 +391,7 @@ fn volumes_are_attached_and_taken_away() {
     let copy = fs::read(place.path("bridge/evidence/C1_core_1/core.mha")).unwrap();
     let head = String::from_utf8_lossy(&copy[..240]).into_owned();
     assert!(head.contains("ElementSpacing = 2 2 4\nDimSize = 32 24 20\n"), "{head}");
-    assert!(
-        head.contains("MSB = True") && copy.ends_with(&[0, 100 + (32 * 24 * 20 - 1) as u8 % 7])
-    );
+    assert!(head.contains("MSB = True") && copy.ends_with(&[0, 100 + (32 * 24 * 20 - 1) as u8 % 7]));
     // The copy is a volume as any other.
     let mha = text(&place.path("bridge/evidence/C1_core_1/core.mha")).to_owned();
     place.refuses("attach", &["C1", &mha, "--along", "0.3"], 65, &["20 slices", "--stack"]);
@@ -422,10 +420,7 @@ fn gauges_are_read_over_the_years() {
     let csv = place.brings("since.csv", format!("date;gauge;value;temperature_c\n{rows}"));
     let told = place.done("attach", &["C1", &csv, "--unit", "ue"]);
     let added = &told["added"][0];
-    assert_eq!(
-        [&added["name"], &added["kind"], &added["value"]],
-        ["SG1", "monitoring", "9 readings"]
-    );
+    assert_eq!([&added["name"], &added["kind"], &added["value"]], ["SG1", "monitoring", "9 readings"]);
     let hot = place.brings("hot.csv", "date,gauge,value,temperature_c\n2025-01-02,SG1,3,280\n");
     place.refuses("attach", &["C1", &hot, "--unit", "ue"], 65, &["hot.csv:2", "kelvin"]);
     let no_gauge = place.brings("t.csv", "mV,temperature_c\n-300,4\n");
