@@ -51,7 +51,7 @@ pub(crate) struct Piece {
     /// Index of the member's face.
     pub(crate) face: Option<usize>,
     /// Of what is no member's face: to which side of the world's axes it looks.
-    way: usize,
+    pub(crate) way: usize,
 }
 
 /// What a pixel shows of a member.

@@ -178,7 +178,7 @@ impl Fit {
         slopes.iter().map(of).sum::<f64>().max(0.0)
     }
 
-    /// H⁻¹ (Σ g gᵀ) H⁻¹ with g summed over each tile (K.-Y. Liang and S. Zeger, "Longitudinal data
+    /// H⁻¹ (Σ g gᵀ) H⁻¹, H by the loss's own second derivative, with g summed over each tile (K.-Y. Liang and S. Zeger, "Longitudinal data
     /// analysis using generalized linear models", 1986): residuals of neighbours go together. The
     /// prior of the bends adds to H.
     fn sandwich(&self, samples: &[Sample], weights: &[[f64; 3]]) -> DMatrix<f64> {
@@ -189,13 +189,14 @@ impl Fit {
         for (sample, weight) in samples.iter().zip(weights) {
             let (expected, residual) = (self.expected(sample), self.residuals(sample));
             for c in 0..3 {
-                let w =
-                    weight[c] * expected[c].powi(2) / self.scatter[c].max(LEAST_SCATTER).powi(2);
+                let scatter = self.scatter[c].max(LEAST_SCATTER);
+                let w = weight[c] * (expected[c] / scatter).powi(2);
                 if w > 0.0 && w.is_finite() {
+                    let bend = tukey_slope(residual[c] / scatter) / scatter.powi(2);
                     let slopes = self.slopes(&sample.light, c, sample.radius2);
                     for (i, a) in &slopes {
                         pull[sample.tile as usize][*i] += w * residual[c] * a;
-                        slopes.iter().for_each(|(j, b)| curve[(*i, *j)] += w * a * b);
+                        slopes.iter().for_each(|(j, b)| curve[(*i, *j)] += bend * a * b);
                     }
                 }
             }
@@ -229,6 +230,12 @@ fn tukey(r: f64) -> f64 {
     if u.abs() < 1.0 { (1.0 - u * u).powi(2) } else { 0.0 }
 }
 
+/// d/dr of r times the weight.
+fn tukey_slope(r: f64) -> f64 {
+    let u2 = (r / TUKEY).powi(2);
+    if u2 < 1.0 { (1.0 - u2) * (1.0 - 5.0 * u2) } else { 0.0 }
+}
+
 /// 1.4826 times the median of absolute values.
 fn deviation(values: impl Iterator<Item = f64>) -> f64 {
     let mut sizes: Vec<f64> = values.map(f64::abs).collect();
@@ -258,7 +265,7 @@ mod tests {
             let radius2 = 2.0 * (x * x + y * y);
             let key = Key::new(seed, u64::from(k));
             let damaged = (k % side < 12 && k / side < 36) as u32;
-            let rho = (0.05 * key.normal(0)).exp() * 0.4_f64.powi(damaged as i32);
+            let rho = (1.0 + 0.05 * key.normal(0)) * 0.4_f64.powi(damaged as i32);
             let v = vignetting(bends, radius2);
             let y = [0, 1, 2]
                 .map(|c| rho * v * (strength[0][c] * light[0][c] + strength[1][c] * light[1][c]));
@@ -275,14 +282,12 @@ mod tests {
         for seed in 0..100 {
             let (samples, strength, bends) = planted(seed);
             let fit = Fit::new(&samples, 2);
-            for c in 0..3 {
-                for k in 0..2 {
-                    let error = fit.covariance[(2 * c + k, 2 * c + k)].sqrt();
-                    let off = fit.strength[k][c] - strength[k][c];
-                    assert!(off.abs() < 0.05 * strength[k][c], "{seed}: {fit:?}");
-                    squares += (off / error).powi(2);
-                    count += 1.0;
-                }
+            for (k, c) in (0..2).flat_map(|k| (0..3).map(move |c| (k, c))) {
+                let error = fit.covariance[(2 * c + k, 2 * c + k)].sqrt();
+                let off = fit.strength[k][c] - strength[k][c];
+                assert!(off.abs() < 0.05 * strength[k][c], "{seed}: {fit:?}");
+                squares += (off / error).powi(2);
+                count += 1.0;
             }
             assert!((fit.bends[0] - bends[0]).abs() < 0.05, "{:?}", fit.bends);
             // A normal's is .05; the fifth that is damaged widens the median.

@@ -69,6 +69,13 @@ impl Frame {
         Ok(frame)
     }
 
+    /// A frame by what it shows.
+    #[cfg(test)]
+    pub(super) fn flat(size: [usize; 2], shown: Vec<Option<Shown>>) -> Self {
+        let has_face = vec![true; shown.len()];
+        Self { size, scale: 1.0, top: 0.0, whole: size.map(|n| n as f64), shown, has_face }
+    }
+
     /// What a pixel shows and nothing else, and whether its middle is on a member's face.
     fn shows(&self, site: &Site, located: &Located, [x, y]: [usize; 2]) -> (Option<Shown>, bool) {
         let at = self.in_photo([x as f64 + 0.5, y as f64 + 0.5]);

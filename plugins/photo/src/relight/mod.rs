@@ -8,6 +8,7 @@
 //! Reflectance is relative: (ρ, a) and (cρ, a/c) give the same direct light. As a whole it stays
 //! where the scene has it.
 
+mod expected;
 mod fit;
 mod frame;
 mod lamps;
@@ -21,10 +22,9 @@ mod smooth;
 use glam::Vec3;
 use intrados_scene::Scene;
 use intrados_stage::{Cancelled, Job};
-use rayon::prelude::*;
 
 use crate::{Located, Photograph, Site};
-use fit::{Fit, Sample, vignetting};
+use fit::{Fit, Sample};
 use frame::Frame;
 use lamps::Source;
 use noise::Noise;
@@ -44,10 +44,6 @@ const FEWEST: usize = 100;
 const ALIKE: f64 = 0.1;
 /// A lamp that brings less than this share of all light to what is seen does not reach it.
 const UNSEEN: f64 = 1e-4;
-/// Share of a piece's median light below which it lies in the shadow.
-const SHADOW: f64 = 0.03;
-/// Light that is known worse than this (standard error of its logarithm) is unknown.
-const VAGUE: f64 = 0.5;
 /// Reflectance is not corrected again once that changes light by less than this share.
 const SETTLED: f64 = 0.01;
 /// Fewest pixels by which an object's reflectance is corrected, and by how much at most.
@@ -182,13 +178,13 @@ pub fn relight(
         let by = corrections(&frame, &samples, &fit, even.objects.len());
         let change = by.iter().map(|f| f.map(|f| f.ln().abs()).max_element()).fold(0.0, f32::max);
         if round >= settings.rounds || f64::from(change) * reflected_share < SETTLED {
-            let mut expected = expected(&frame, &groups, &pictures, &fit, located, settings);
+            let mut expected = expected::light(&frame, &groups, &pictures, &fit, located, settings);
             for (expected, shown) in expected.iter_mut().zip(&frame.shown) {
                 let Some(shown) = shown else { continue };
                 let colour = even.materials[shown.piece.object as usize].base_colour;
                 (0..3).for_each(|c| expected[c] /= f64::from(colour[c]).max(1e-4));
             }
-            let unknown = unknown(&frame, &averaged, &expected);
+            let unknown = expected::unknown(&frame, &averaged, &expected);
             let noise = Noise::of(photograph);
             let samples = settings.samples;
             return Ok(Relit {
@@ -252,7 +248,7 @@ fn grouped(frame: &Frame, sources: &[Source], pictures: &[Picture]) -> (Vec<Grou
 }
 
 /// Light of each group at a pixel.
-fn light(groups: &[Group], pictures: &[Picture], k: usize) -> Vec<[f64; 3]> {
+fn of_groups(groups: &[Group], pictures: &[Picture], k: usize) -> Vec<[f64; 3]> {
     let of = |group: &Group| {
         let add = |sum: [f64; 3], l: &usize| {
             let mean = pictures[*l].field.mean[k];
@@ -274,7 +270,7 @@ fn samples(
     let of = |k: usize| {
         frame.shown[k]?;
         let y = averaged[k].filter(|y| y.iter().all(|y| *y > 0.0))?;
-        let light = light(groups, pictures, k);
+        let light = of_groups(groups, pictures, k);
         let is_lit = (0..3).all(|c| light.iter().any(|l| l[c] > 0.0));
         let tile = (k / columns / TILE * columns.div_ceil(TILE) + k % columns / TILE) as u32;
         let radius2 = frame.radius2(frame.middle(k));
@@ -285,16 +281,17 @@ fn samples(
 
 /// Share of light on members that was reflected on its way.
 fn reflected_share(frame: &Frame, groups: &[Group], pictures: &[Picture], fit: &Fit) -> f64 {
+    let is_member = |k: &usize| frame.shown[*k].is_some_and(|s| s.piece.member.is_some());
+    let members: Vec<usize> = (0..frame.shown.len()).filter(is_member).collect();
     let (mut reflected, mut all) = (0.0, 0.0);
-    for (k, _) in
-        frame.shown.iter().enumerate().filter(|(_, s)| s.is_some_and(|s| s.piece.member.is_some()))
-    {
-        for (group, a) in groups.iter().zip(&fit.strength) {
-            for c in 0..3 {
-                reflected +=
-                    group.of.iter().map(|l| a[c] * pictures[*l].reflected[k][c]).sum::<f64>();
-                all += group.of.iter().map(|l| a[c] * pictures[*l].field.mean[k][c]).sum::<f64>();
-            }
+    for (group, a) in groups.iter().zip(&fit.strength) {
+        let sum = |of: &[[f64; 3]]| {
+            let at = |k: &usize| of[*k].iter().zip(a).map(|(l, a)| l * a).sum::<f64>();
+            members.iter().map(at).sum::<f64>()
+        };
+        for picture in group.of.iter().map(|l| &pictures[*l]) {
+            reflected += sum(&picture.reflected);
+            all += sum(&picture.field.mean);
         }
     }
     if all > 0.0 { (reflected / all).clamp(0.0, 1.0) } else { 0.0 }
@@ -331,119 +328,4 @@ fn corrections(frame: &Frame, samples: &[Option<Sample>], fit: &Fit, objects: us
         Vec3::from([0, 1, 2].map(|c| l[c].map_or(1.0, |(_, l)| (l - level[c]).exp() as f32)))
     };
     logs.into_iter().map(factor).collect()
-}
-
-/// ŷ and the variance of its logarithm by pixel; NaN in shadows and where it is vague.
-fn expected(
-    frame: &Frame,
-    groups: &[Group],
-    pictures: &[Picture],
-    fit: &Fit,
-    located: &Located,
-    settings: &RelightSettings,
-) -> Vec<[f64; 6]> {
-    let light: Vec<Vec<[f64; 3]>> =
-        (0..frame.shown.len()).into_par_iter().map(|k| light(groups, pictures, k)).collect();
-    let lit: Vec<[f64; 3]> = light
-        .iter()
-        .map(|light| {
-            light
-                .iter()
-                .zip(&fit.strength)
-                .fold([0.0; 3], |sum, (l, a)| [0, 1, 2].map(|c| sum[c] + a[c] * l[c]))
-        })
-        .collect();
-    let shadow = shadows(frame, &lit);
-    let at = |k: usize| {
-        let unknown = [f64::NAN; 6];
-        let Some(shown) = frame.shown[k] else { return unknown };
-        if lit[k].iter().sum::<f64>() <= shadow(&shown.piece) || lit[k].iter().any(|l| *l <= 0.0) {
-            return unknown;
-        }
-        let radius2 = frame.radius2(frame.middle(k));
-        let v = vignetting(fit.bends, radius2);
-        let shift = shifted(frame, &lit, k, located, settings.shadow_error_m);
-        let mut found = unknown;
-        for c in 0..3 {
-            let walks: f64 = groups
-                .iter()
-                .zip(&fit.strength)
-                .flat_map(|(group, a)| group.of.iter().map(move |l| (l, a[c])))
-                .map(|(l, a)| a * a * pictures[*l].field.variance[k][c])
-                .sum::<f64>()
-                / lit[k][c].powi(2);
-            found[c] = v * lit[k][c];
-            found[3 + c] = walks + fit.variance(&light[k], c, radius2) + shift[c];
-        }
-        if (3..6).any(|c| !(found[c] < VAGUE * VAGUE)) { unknown } else { found }
-    };
-    (0..lit.len()).into_par_iter().map(at).collect()
-}
-
-/// Share of the pixels that show a member's face of which nothing can be said.
-fn unknown(frame: &Frame, averaged: &[Option<[f64; 3]>], expected: &[[f64; 6]]) -> f64 {
-    let faces: Vec<usize> = (0..frame.shown.len()).filter(|k| frame.has_face[*k]).collect();
-    let dark = faces.iter().filter(|k| averaged[**k].is_none() || !expected[**k][0].is_finite());
-    dark.count() as f64 / faces.len().max(1) as f64
-}
-
-/// Light of a piece below which it lies in the shadow.
-fn shadows(frame: &Frame, lit: &[[f64; 3]]) -> impl Fn(&crate::site::Piece) -> f64 + Sync {
-    let mut of: std::collections::BTreeMap<_, Vec<f64>> = std::collections::BTreeMap::new();
-    for (shown, lit) in frame.shown.iter().zip(lit) {
-        if let Some(shown) = shown {
-            of.entry(shown.piece).or_default().push(lit.iter().sum());
-        }
-    }
-    let median = |mut all: Vec<f64>| {
-        let middle = all.len() / 2;
-        SHADOW * *all.select_nth_unstable_by(middle, f64::total_cmp).1
-    };
-    let limits: std::collections::BTreeMap<_, f64> =
-        of.into_iter().map(|(piece, all)| (piece, median(all))).collect();
-    move |piece| limits.get(piece).copied().unwrap_or(0.0)
-}
-
-/// Variance of log ŷ because it may belong to another place: by its slope where that is a matter of
-/// the pose or lies within a pixel, by the largest step within the stated error of shadows.
-fn shifted(
-    frame: &Frame,
-    lit: &[[f64; 3]],
-    k: usize,
-    located: &Located,
-    shadow_error_m: f64,
-) -> [f64; 3] {
-    let Some(shown) = frame.shown[k] else { return [0.0; 3] };
-    let pixels_m =
-        located.pose.focal_px / located.pose.position.distance(shown.place) / frame.scale;
-    let reach = (shadow_error_m * pixels_m).min(24.0);
-    let (mut moment, mut slope) = ([0.0_f64; 3], [[0.0_f64; 2]; 3]);
-    let mut step = [0.0_f64; 3];
-    for (q, [i, j]) in frame.around(k, (reach.ceil() as usize).max(1)) {
-        let log: [f64; 3] =
-            [0, 1, 2].map(|c| if lit[q][c] > 0.0 { (lit[q][c] / lit[k][c]).ln() } else { 1.0 });
-        if i * i + j * j <= reach * reach {
-            (0..3).for_each(|c| step[c] = step[c].max(log[c].abs()));
-        }
-        if i.abs() <= 1.0 && j.abs() <= 1.0 {
-            moment = [moment[0] + i * i, moment[1] + i * j, moment[2] + j * j];
-            (0..3).for_each(|c| slope[c] = [slope[c][0] + i * log[c], slope[c][1] + j * log[c]]);
-        }
-    }
-    let [xx, xy, yy] = moment;
-    let det = xx * yy - xy * xy;
-    // Half a pixel's width, evenly: 1/12.
-    let cover = [shown.shift[0] + 1.0 / 12.0, shown.shift[1], shown.shift[2] + 1.0 / 12.0];
-    [0, 1, 2].map(|c| {
-        let by_slope = if det > 0.0 {
-            let [x, y] = slope[c];
-            let [gx, gy] = [(yy * x - xy * y) / det, (xx * y - xy * x) / det];
-            // Steps within a fraction of a pixel go as the slope does.
-            let wide = if reach < 1.0 { reach * reach } else { 0.0 };
-            gx * gx * (cover[0] + wide) + 2.0 * gx * gy * cover[1] + gy * gy * (cover[2] + wide)
-        } else {
-            0.0
-        };
-        by_slope + if reach >= 1.0 { step[c].powi(2) } else { 0.0 }
-    })
 }

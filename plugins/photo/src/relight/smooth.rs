@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::frame::Frame;
 
 /// Half widths of the windows, pixels.
-const REACH: [usize; 6] = [1, 2, 3, 5, 8, 12];
+const REACH: [usize; 7] = [0, 1, 2, 3, 5, 8, 12];
 /// A window counts while what it says lies within so many standard errors of all smaller ones.
 const AGREE: f64 = 2.0;
 /// What a fit by a plane may be wrong by where windows just agree, as a share of the variance.
@@ -102,4 +102,57 @@ fn plane(
         }
     }
     (value, error2)
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+    use intrados_stage::random::Key;
+
+    use super::*;
+    use crate::{relight::frame::Shown, site::Piece};
+
+    const SIDE: usize = 64;
+
+    /// Two pieces side by side; a slope on one, on the other a shadow with a sharp edge.
+    fn truth(k: usize) -> f64 {
+        let (x, y) = (k % SIDE, k / SIDE);
+        match (x < SIDE / 2, y < 3 * SIDE / 4) {
+            (true, _) => 1.0 + 0.01 * x as f64 - 0.008 * y as f64,
+            (false, true) => 2.0,
+            (false, false) => 0.5,
+        }
+    }
+
+    /// Light is known several times better where it is smooth, and as well as is said; no light
+    /// leaks over the edge of a piece or of a shadow.
+    #[test]
+    fn windows_grow_where_light_is_smooth_and_errors_hold() {
+        let shown = |k: usize| {
+            let piece =
+                Piece { object: u32::from(k % SIDE < SIDE / 2), member: None, face: None, way: 1 };
+            Some(Shown { piece, place: DVec3::ZERO, shift: [0.0; 3] })
+        };
+        let n = SIDE * SIDE;
+        let frame = Frame::flat([SIDE, SIDE], (0..n).map(shown).collect());
+        let error = |k: usize| 0.2 * truth(k);
+        let noisy = |k: usize| truth(k) + error(k) * Key::new(9, k as u64).normal(0);
+        let raw = Field {
+            mean: (0..n).map(|k| [noisy(k); 3]).collect(),
+            variance: (0..n).map(|k| [error(k).powi(2); 3]).collect(),
+        };
+        let smooth = smoothed(&frame, &raw);
+        let (mut inside, mut gain) = (0, 0.0);
+        for k in 0..n {
+            let off = smooth.mean[k][0] - truth(k);
+            inside += usize::from(off.abs() < 1.96 * smooth.variance[k][0].sqrt());
+            gain += error(k) / smooth.variance[k][0].sqrt() / n as f64;
+            // A window of three pixels may well lie across the shadow's edge.
+            let is_edge = (SIDE * 3 / 4 - 1..=SIDE * 3 / 4).contains(&(k / SIDE));
+            assert!(is_edge || off.abs() < 4.5 * error(k), "{k}: {off}");
+        }
+        let share = inside as f64 / n as f64;
+        println!("{share} within, {gain} times better");
+        assert!((0.90..=1.0).contains(&share) && gain > 4.0, "{share} {gain}");
+    }
 }
