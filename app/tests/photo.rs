@@ -124,7 +124,7 @@ fn a_photograph_is_placed_and_its_faces_unrolled() {
     let focal = planted.focal_px.to_string();
     let call = |csv: &Path, out: &Path| {
         let how = ["--picking-px", "0.5", "--member", "C2", "--mm-per-px", "2", "--format", "json"];
-        let relight = ["--relight", "--spp", "8"];
+        let relight = ["--relight", "--spp", "32"];
         let what = ["photo", model, text(&photo), "--pose", text(csv), "--focal-px", &focal];
         run(&[&what[..], &how[..], &relight[..], &["--out", text(out)]].concat())
     };

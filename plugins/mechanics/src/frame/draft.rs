@@ -233,7 +233,8 @@ impl<'a> Part<'a> {
         };
         let shape = Shape::of(assembly, &axes, &solid)
             .ok_or("its surface is cut into no sections: close it")?;
-        let concrete = matter::bearing(scene, assembly).map_err(|why| why.to_string())?;
+        let concrete =
+            matter::properties(scene, &assembly.concrete).map_err(|why| why.to_string())?;
         let (stations, points) = (Vec::new(), Vec::new());
         Ok(Self { assembly, axes, solid, shape, concrete, stations, first: 0, points })
     }

@@ -1,8 +1,8 @@
 //! What the regions of a member are made of, and since when.
 
 use intrados_scene::{
-    Assembly, Scene,
-    structure::{ASSUMED_CONCRETE, Body as Shape, Cement as Written, GroundModel},
+    Scene,
+    structure::{Body as Shape, Cement as Written, GroundModel},
 };
 
 use super::{
@@ -155,22 +155,6 @@ impl Draft<'_> {
             .sum();
         2.0 * mesh.volume() / side.max(1e-9)
     }
-}
-
-/// Expansion of what is no concrete, 1/K (that of steel and concrete; wood has half of it).
-const EXPANSION: f64 = 1e-5;
-
-/// What a member of the whole bears by. What is no concrete never cracks.
-pub(crate) fn bearing(scene: &Scene, assembly: &Assembly) -> Result<Properties, Error> {
-    let Some(matter) = &assembly.matter else { return properties(scene, &assembly.concrete) };
-    Ok(Properties {
-        modulus: 1e9 * f64::from(matter.modulus_gpa),
-        poisson: f64::from(matter.poisson),
-        expansion: EXPANSION,
-        density: f64::from(matter.density_kg_m3),
-        fctm: f64::INFINITY,
-        ..properties(scene, ASSUMED_CONCRETE)?
-    })
 }
 
 /// All that is known and assumed of a concrete by its name.

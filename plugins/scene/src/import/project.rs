@@ -506,7 +506,7 @@ fn summary(folder: &Path, source: &Source, built: &Built, members: &[Detail]) ->
         });
     for (count, matter) in others.into_values() {
         notes.push(format!(
-            "{count} members are of {}, which is no concrete: in the whole they bear with E = {} GPa and {} kg/m³, but each by itself is computed as concrete all the same",
+            "{count} members are of {} (E some {} GPa, {} kg/m³), which is no concrete: they are computed as concrete all the same",
             matter.name, matter.modulus_gpa, matter.density_kg_m3
         ));
     }

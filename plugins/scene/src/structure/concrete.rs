@@ -3,8 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// What a member is of that is no concrete. In the whole structure it bears by these; by itself it
-/// is computed as concrete all the same, and that is said.
+/// What a member is of that is no concrete. It is computed as concrete all the same, and that is
+/// said wherever its concrete is named.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Matter {
