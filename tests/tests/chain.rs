@@ -335,5 +335,5 @@ fn the_report_is_whole_and_escapes_names() {
         json["members"][0]["evidence"]["ct"]["damage"].is_number()
             && json["members"][1]["damage"].is_null()
     );
-    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 9);
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 10);
 }

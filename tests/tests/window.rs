@@ -428,8 +428,8 @@ fn a_prediction_goes_on_while_the_picture_is_paused_and_is_saved_as_by_predict()
         .collect();
     names.sort();
     let expected = [
-        "damage.bcf",
         "damage-3.0.bcf",
+        "damage.bcf",
         "damage.glb",
         "damage.vtu",
         "defects.csv",
