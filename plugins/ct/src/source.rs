@@ -104,8 +104,11 @@ struct Shelf {
     /// Hash of the scene that all of it is of.
     scene: String,
     scanned: Vec<Ordered>,
-    cut: Option<(Arc<[PathBuf]>, Sections)>,
+    cut: Option<(Volume, Sections)>,
 }
+
+/// The files of a volume, and the edges of its voxels where they are given, mm.
+type Volume = (Arc<[PathBuf]>, Option<[f32; 3]>);
 
 /// Sections along [`Plane::all`].
 type Sections = Arc<Vec<Option<Section>>>;
@@ -137,21 +140,23 @@ impl SliceShelf {
         Ok(layer)
     }
 
-    /// From the shelf, or cut and put there in place of what was cut before.
+    /// From the shelf, or cut, if it `fits`, and put there in place of what was cut before.
     fn sections(
         &self,
         scene: &Scene,
-        images: &Arc<[PathBuf]>,
-        voxel_mm: Option<[f32; 3]>,
+        volume: &Volume,
+        fits: impl FnOnce() -> Result<(), SliceError>,
         job: &Job,
-    ) -> Result<Sections, VolumeError> {
+    ) -> Result<Sections, SliceError> {
         if let Some((of, sections)) = &self.of(scene).cut
-            && of == images
+            && of == volume
         {
             return Ok(Arc::clone(sections));
         }
-        let sections = Arc::new(stack::sections(images, voxel_mm, &Plane::all(), job)?);
-        self.of(scene).cut = Some((Arc::clone(images), Arc::clone(&sections)));
+        fits()?;
+        let (images, voxel_mm) = volume;
+        let sections = Arc::new(stack::sections(images, *voxel_mm, &Plane::all(), job)?);
+        self.of(scene).cut = Some((volume.clone(), Arc::clone(&sections)));
         Ok(sections)
     }
 
@@ -368,8 +373,9 @@ impl SliceSource {
                 (slice, labels.map(Known::Labels))
             }
             What::Stack { images, voxel_mm, plane, drilled } => {
-                self.piled(scene, images, *voxel_mm)?;
-                let sections = shelf.sections(scene, images, *voxel_mm, job)?;
+                let volume = (Arc::clone(images), *voxel_mm);
+                let fits = || self.piled(scene, images, *voxel_mm);
+                let sections = shelf.sections(scene, &volume, fits, job)?;
                 let planes = Plane::all();
                 let at = planes.iter().position(|p| p == plane).unwrap_or_default();
                 let Some(section) = sections.get(at).and_then(Option::as_ref) else {
