@@ -38,6 +38,8 @@ const CSS: &str = include_str!("report.css");
 const MOST: usize = 24;
 /// Pores of a member that are in the report.
 const LARGEST: usize = 5;
+/// Longer side of a defect's photograph, pixels.
+const LOOK: u32 = 240;
 /// Signs of states, from the best to the worst.
 const SIGNS: [&str; 4] = ["○", "◔", "◑", "●"];
 
@@ -225,12 +227,15 @@ impl<'a> Page<'a> {
     }
 
     fn has_pictures(&self, m: &MemberPrediction) -> bool {
-        m.defects.iter().any(|d| d.picture.is_some())
+        m.defects.iter().any(|d| d.picture.is_some() || d.photo.is_some())
     }
 
     /// The address of a defect's picture.
     fn look(&self, defect: &Defect) -> Option<String> {
-        defect.picture.as_ref()?.data_url()
+        match &defect.photo {
+            Some(photo) => Picture::read(photo, LOOK)?.data_url(),
+            None => defect.picture.as_ref()?.data_url(),
+        }
     }
 
     fn length(&self, m: &MemberPrediction) -> f64 {

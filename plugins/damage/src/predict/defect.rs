@@ -1,5 +1,7 @@
 //! Defects as an owner's list has them: what, where, how large, how much of it, told by whom.
 
+use std::path::PathBuf;
+
 use intrados_scene::{
     Scene,
     structure::{Course, Observation, Shows},
@@ -14,9 +16,6 @@ use crate::{
     survey::{self, SURVEY},
     zone::zone_at,
 };
-
-/// Longer side of a defect's picture, pixels.
-const LOOK: u32 = 240;
 
 /// One thing that is wrong with a member, as somebody found it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -44,6 +43,9 @@ pub struct Defect {
     /// What it looks like, small.
     #[serde(skip)]
     pub picture: Option<Picture>,
+    /// Its photograph: read by whoever shows it, since a prediction is put together often.
+    #[serde(skip)]
+    pub photo: Option<PathBuf>,
 }
 
 impl Defect {
@@ -75,7 +77,8 @@ fn seen(o: &Observation) -> Option<Defect> {
         source: SURVEY,
         item: o.name.clone(),
         date: o.date.map(|d| d.to_string()),
-        picture: o.picture.as_deref().and_then(|path| Picture::read(path, LOOK)),
+        picture: None,
+        photo: o.picture.clone(),
     };
     match o.shows {
         Shows::Crack { width_mm, std_error_mm, course, length_m } => {
@@ -128,6 +131,7 @@ fn sectioned(sections: &[&SliceReading]) -> Vec<Defect> {
         item: format!("{}, {}", slice.core, slice.name),
         date: slice.drilled.and_then(|d| d.date).map(|d| d.to_string()),
         picture: None,
+        photo: None,
     };
     let cracked = || sections.iter().filter_map(|s| Some((*s, widest(&s.cracks)?)));
     let worst = cracked().max_by(|a, b| a.1.width_mm.total_cmp(&b.1.width_mm));
