@@ -5,7 +5,7 @@ use std::collections::HashSet;
 use glam::Vec3;
 
 use super::*;
-use crate::{Damage, Lens, problem::Problem};
+use crate::{Damage, Drilled, Lens, problem::Problem};
 
 /// Lengths beyond this are refused, m: single precision has no millimetres left.
 const FAR: f32 = 1e5;
@@ -1000,33 +1000,15 @@ impl Checker<'_> {
 
     pub(super) fn slices(&mut self, slices: &Slices) {
         match slices {
-            Slices::Files {
-                name,
-                images,
-                pixel_mm,
-                along,
-                angle_deg,
-                depth_m,
-                diameter_mm,
-                ..
-            } => {
+            Slices::Files { name, images, pixel_mm, .. } => {
                 pixel_mm.iter().for_each(|mm| _ = self.within("pixel_mm", *mm, 1e-4, 100.0));
-                self.of_files(name, images, [along, angle_deg, depth_m, diameter_mm]);
+                self.of_files(name, images, slices.drilled());
             }
-            Slices::Stack {
-                name,
-                images,
-                voxel_mm,
-                along,
-                angle_deg,
-                depth_m,
-                diameter_mm,
-                ..
-            } => {
+            Slices::Stack { name, images, voxel_mm, .. } => {
                 for (i, mm) in voxel_mm.iter().flatten().enumerate() {
                     self.within(&format!("voxel_mm[{i}]"), *mm, 1e-4, 100.0);
                 }
-                self.of_files(name, images, [along, angle_deg, depth_m, diameter_mm]);
+                self.of_files(name, images, slices.drilled());
             }
             Slices::Drawn { name, count, size, pixel_mm, .. } => {
                 self.text("name", name);
@@ -1076,16 +1058,16 @@ impl Checker<'_> {
         }
     }
 
-    /// What slices of files have in common: their place is along, angle, depth, diameter.
-    fn of_files(&mut self, name: &str, images: &[String], place: [&Option<f32>; 4]) {
+    /// What slices of files have in common.
+    fn of_files(&mut self, name: &str, images: &[String], drilled: Drilled) {
         self.text("name", name);
-        let fields = [
-            ("along", 0.0, 1.0),
-            ("angle_deg", -360.0, 360.0),
-            ("depth_m", 0.0, 100.0),
-            ("diameter_mm", 10.0, 2000.0),
+        let place = [
+            ("along", drilled.along, 0.0, 1.0),
+            ("angle_deg", drilled.angle_deg, -360.0, 360.0),
+            ("depth_m", drilled.depth_m, 0.0, 100.0),
+            ("diameter_mm", drilled.diameter_mm, 10.0, 2000.0),
         ];
-        for ((field, low, high), value) in fields.into_iter().zip(place) {
+        for (field, value, low, high) in place {
             value.iter().for_each(|v| _ = self.within(field, *v, low, high));
         }
         if images.is_empty() {

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Body, Exposure, Pour, Reinforcement};
 use crate::{
-    AxisRuns, Damage,
+    AxisRuns, Damage, Drilled,
     structure::{Date, Matter},
 };
 
@@ -145,6 +145,17 @@ pub enum Slices {
 }
 
 impl Slices {
+    /// Where slices of files come from, as far as somebody said; nothing of those that are made.
+    pub(crate) fn drilled(&self) -> Drilled {
+        match *self {
+            Self::Files { along, angle_deg, depth_m, diameter_mm, axis, date, .. }
+            | Self::Stack { along, angle_deg, depth_m, diameter_mm, axis, date, .. } => {
+                Drilled { date, along, angle_deg, depth_m, diameter_mm, axis }
+            }
+            Self::Drawn { .. } | Self::Scanned { .. } => Drilled::default(),
+        }
+    }
+
     /// Name of the core or sections.
     pub(crate) fn name(&self) -> &str {
         match self {

@@ -483,6 +483,7 @@ impl Builder<'_> {
         job: &Job,
     ) -> Result<(), LoadError> {
         for slices in slices {
+            let drilled = slices.drilled();
             let found = match slices {
                 super::Slices::Drawn { name, count, size, pixel_mm, seed } => {
                     crate::Slices::Drawn {
@@ -499,27 +500,9 @@ impl Builder<'_> {
                     along: along.clone(),
                     seed: *seed,
                 },
-                super::Slices::Files {
-                    name,
-                    images,
-                    pixel_mm,
-                    along,
-                    angle_deg,
-                    depth_m,
-                    diameter_mm,
-                    axis,
-                    date,
-                } => {
+                super::Slices::Files { name, images, pixel_mm, .. } => {
                     let (images, masks) = super::slices::find(self.sources, folder, images, job)?;
-                    let drilled = crate::Drilled {
-                        date: *date,
-                        along: *along,
-                        angle_deg: *angle_deg,
-                        depth_m: *depth_m,
-                        diameter_mm: *diameter_mm,
-                        axis: *axis,
-                    };
-                    self.scene.warnings.extend(placeless(name, *along));
+                    self.scene.warnings.extend(placeless(name, drilled.along));
                     crate::Slices::Files {
                         name: name.clone(),
                         images,
@@ -528,31 +511,14 @@ impl Builder<'_> {
                         drilled,
                     }
                 }
-                super::Slices::Stack {
-                    name,
-                    images,
-                    voxel_mm,
-                    along,
-                    angle_deg,
-                    depth_m,
-                    diameter_mm,
-                    axis,
-                    date,
-                } => {
+                super::Slices::Stack { name, images, voxel_mm, .. } => {
                     let (images, _) = super::slices::find(self.sources, folder, images, job)?;
-                    self.scene.warnings.extend(placeless(name, *along));
+                    self.scene.warnings.extend(placeless(name, drilled.along));
                     crate::Slices::Stack {
                         name: name.clone(),
                         images,
                         voxel_mm: *voxel_mm,
-                        drilled: crate::Drilled {
-                            date: *date,
-                            along: *along,
-                            angle_deg: *angle_deg,
-                            depth_m: *depth_m,
-                            diameter_mm: *diameter_mm,
-                            axis: *axis,
-                        },
+                        drilled,
                     }
                 }
             };
