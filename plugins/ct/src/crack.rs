@@ -6,7 +6,7 @@
 //! has grown is a crack if it is at least ten times longer than wide, thin throughout, and has no
 //! more outline than a strip.
 
-use crate::grid::median;
+use intrados_raster::grid::median;
 use std::{
     cmp::Reverse,
     collections::{BinaryHeap, HashMap, HashSet},
@@ -16,7 +16,7 @@ use intrados_stage::Job;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::grid::{Grid, Mask};
+use intrados_raster::grid::{Grid, Mask};
 
 /// How cracks are found. Lengths in pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

@@ -15,11 +15,11 @@ use statrs::function::erf::erfc;
 
 use crate::{
     crack::{self, Crack},
-    grid::{Components, Grid, Mask, median},
     network::{Class, Network},
     normal::{self, Normal},
     slice::Slice,
 };
+use intrados_raster::grid::{Components, Grid, Mask, median};
 
 /// How it is decided which pixels are dark.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]

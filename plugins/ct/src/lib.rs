@@ -4,7 +4,6 @@ pub mod batch;
 pub mod crack;
 pub mod detect;
 mod error;
-pub mod grid;
 pub mod network;
 pub mod normal;
 pub mod outline;
@@ -18,7 +17,7 @@ pub mod synthetic;
 
 pub use detect::{DetectSettings, Detection, Method, Pore, detect};
 pub use error::SliceError;
-pub use grid::{Grid, Mask};
+pub use intrados_raster::{Grid, Mask};
 pub use network::Network;
 pub use picture::Picture;
 pub use slice::{Slice, Slices};

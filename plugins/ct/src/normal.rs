@@ -1,15 +1,12 @@
 //! Grey values made comparable: sound concrete 1, no cupping, a contrast as usual.
 
-use crate::grid::median;
+use intrados_raster::grid::median;
 use std::borrow::Cow;
 
 use intrados_stage::{Cancelled, Job};
 
-use crate::{
-    detect::DetectSettings,
-    grid::{Grid, Mask},
-    slice::Slice,
-};
+use crate::{detect::DetectSettings, slice::Slice};
+use intrados_raster::grid::{Grid, Mask};
 
 /// A slice in units of its concrete.
 #[derive(Debug, Clone, PartialEq)]

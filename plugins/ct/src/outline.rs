@@ -5,7 +5,7 @@
 //! from a flat side, or from a corner. From a round section the rectangle shrinks with what is
 //! lost, so that a shallow spall there hardly shows.
 
-use crate::grid::{Mask, hull_side, row_ends};
+use intrados_raster::grid::{Mask, hull_side, row_ends};
 use intrados_stage::Estimate;
 
 /// Sides of a section over those of its design: what stands beyond is a core, or a picture of

@@ -12,11 +12,8 @@ use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use intrados_stage::access;
 use serde::{Deserialize, Serialize};
 
-use crate::{
-    crack::Crack,
-    detect::Detection,
-    grid::{Grid, Mask},
-};
+use crate::{crack::Crack, detect::Detection};
+use intrados_raster::grid::{Grid, Mask};
 
 /// An RGB picture with a line under it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]

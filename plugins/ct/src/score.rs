@@ -8,7 +8,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::grid::{Grid, Mask};
+use intrados_raster::grid::{Grid, Mask};
 
 /// Smallest object, pixels.
 pub const MIN_OBJECT: usize = 3;

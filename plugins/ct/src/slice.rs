@@ -10,7 +10,7 @@ use intrados_stage::Job;
 use intrados_xray::volume::{Reader, VolumeError};
 use serde::{Deserialize, Serialize};
 
-use crate::grid::{Grid, Mask};
+use intrados_raster::grid::{Grid, Mask};
 
 /// One CT slice as it was reconstructed (or drawn): grey values proportional to attenuation, air
 /// outside the specimen 0.

@@ -15,7 +15,6 @@ use crate::{
     SliceError,
     crack::{self, Crack},
     detect::{DetectSettings, Detection, detect},
-    grid::Mask,
     slice::{self, PixelFrom, Slice, read_masks},
     stack::{self, Normal, Plane, Section},
     synthetic::{
@@ -23,6 +22,7 @@ use crate::{
         scanned::{self, Layer},
     },
 };
+use intrados_raster::grid::Mask;
 
 /// Where a slice comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -586,7 +586,7 @@ fn pixels(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::grid::Grid;
+    use intrados_raster::grid::Grid;
 
     /// No scene has a scanner of this name, so that only the shelf can know the slice.
     #[test]

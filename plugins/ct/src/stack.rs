@@ -6,7 +6,9 @@ use intrados_scene::AxisRuns;
 use intrados_stage::Job;
 use intrados_xray::volume::{Grid as Voxels, Reader, VolumeError};
 
-use crate::{grid::Grid, slice::Slice};
+use intrados_raster::Grid;
+
+use crate::slice::Slice;
 
 /// Sections of a volume that are read across its pile of slices, and along it each way.
 const ACROSS: usize = 9;

@@ -7,15 +7,12 @@
 //! Where what shows cannot be the bars that were laid, nothing is said, which is not the same as no
 //! loss.
 
-use crate::grid::median;
+use intrados_raster::grid::median;
 use intrados_stage::Estimate;
 use serde::{Deserialize, Serialize};
 
-use crate::{
-    detect::Detection,
-    grid::{Grid, Mask},
-    slice::Slice,
-};
+use crate::{detect::Detection, slice::Slice};
+use intrados_raster::grid::{Grid, Mask};
 
 /// Rolled bars weigh up to so much more or less than their nominal mass (EN 10080:2005, 7.3.2,
 /// diameters above 8 mm), equally likely anywhere within and alike in all bars of a delivery.

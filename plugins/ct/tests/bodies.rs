@@ -5,7 +5,6 @@
 
 use intrados_ct::{
     detect::{DetectSettings, Method, detect},
-    grid::Mask,
     network::{
         simulate::{Noise, Plan, Section, sections},
         train::{Recipe, noisy},
@@ -13,6 +12,7 @@ use intrados_ct::{
     score::Tally,
     slice::Slice,
 };
+use intrados_raster::grid::Mask;
 use intrados_stage::{Job, random::Key};
 
 /// Seed that training did not use.

@@ -5,7 +5,6 @@
 
 use intrados_ct::{
     detect::{DetectSettings, Method, detect},
-    grid::{Grid, Mask},
     network::{
         Class, Network,
         simulate::{Noise, Plan, SIDE, Section, sections},
@@ -13,6 +12,7 @@ use intrados_ct::{
     },
     slice::Slice,
 };
+use intrados_raster::grid::{Grid, Mask};
 use intrados_stage::{Job, random::Key};
 
 /// Seed that training did not use.

@@ -15,9 +15,9 @@ use crate::{
 };
 use intrados_ct::{
     detect::{DetectSettings, detect},
-    grid::Grid,
     slice::Slice,
 };
+use intrados_raster::grid::Grid;
 
 /// Runs all checks on damage.
 ///

@@ -1,6 +1,6 @@
 //! What the parts of it are worth: ablations, and the corrections one by one.
 
-use intrados_ct::grid::median;
+use intrados_raster::grid::median;
 use intrados_stage::{Job, cpu_seconds};
 use intrados_xray::{recon::nrmse_in, scan::Corrections};
 use serde::{Deserialize, Serialize};
@@ -15,13 +15,8 @@ use super::{
     scatter::Effort,
     score::scored,
 };
-use intrados_ct::{
-    crack,
-    detect::DetectSettings,
-    grid::{Grid, Mask},
-    network::Network,
-    slice::Slice,
-};
+use intrados_ct::{crack, detect::DetectSettings, network::Network, slice::Slice};
+use intrados_raster::grid::{Grid, Mask};
 
 /// Plain walks that take as long as learning and steered walks do.
 const UNSTEERED: Effort = Effort { walks: 5 << 15, steered: false, ..STEERED };

@@ -1,6 +1,6 @@
 //! From readings to slices: plainly, or with what the scan did to them taken out.
 
-use intrados_ct::grid::median;
+use intrados_raster::grid::median;
 use intrados_stage::Job;
 use intrados_xray::{
     correct::{axis_by_mirror, bad_pixels, mend, remove_stripes_by_fit},
@@ -17,10 +17,8 @@ use super::{
     scan::{Scan, Sheet},
     scatter::{Effort, Head, Scatter},
 };
-use intrados_ct::{
-    grid::{Grid, Mask},
-    slice::Slice,
-};
+use intrados_ct::slice::Slice;
+use intrados_raster::grid::{Grid, Mask};
 
 /// How far beyond the beam photons wander and come back, m.
 const BEYOND: f64 = 0.15;

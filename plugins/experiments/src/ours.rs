@@ -14,11 +14,11 @@ use super::{
 };
 use intrados_ct::{
     crack, detect,
-    grid::{Grid, Mask},
     network::{Class, Network},
     normal::{Normal, normalised},
     slice::Slice,
 };
+use intrados_raster::grid::{Grid, Mask};
 
 /// What was chosen on rehearsals.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

@@ -2,13 +2,13 @@
 //! less a rim of two pixels, and both call a dark component a crack if it is more than five times
 //! longer than wide.
 
-use intrados_ct::grid::median;
 use intrados_ct::{
     crack,
     detect::{self, DetectSettings},
-    grid::{Grid, Mask, hull_side, row_ends},
     slice::Slice,
 };
+use intrados_raster::grid::median;
+use intrados_raster::grid::{Grid, Mask, hull_side, row_ends};
 
 /// Length over mean width from which a dark component is a crack.
 const ELONGATION: f64 = 5.0;

@@ -29,7 +29,7 @@ use super::{
     scatter::{Effort, Head, Scatter},
     shapes::{Bodies, Truth},
 };
-use intrados_ct::grid::Grid as Picture;
+use intrados_raster::grid::Grid as Picture;
 
 /// From the source to the axis, and on to the panel, m.
 const SOURCE: f64 = 0.8;

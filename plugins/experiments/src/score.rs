@@ -12,10 +12,8 @@ use intrados_stage::random::Key;
 use serde::{Deserialize, Serialize};
 
 use super::{reference::Marks, shapes::Truth};
-use intrados_ct::{
-    grid::{Grid, Mask},
-    score::MIN_OBJECT,
-};
+use intrados_ct::score::MIN_OBJECT;
+use intrados_raster::grid::{Grid, Mask};
 
 /// Pixels that a crack may be off.
 const TOLERANCE: f32 = 2.0;

@@ -21,7 +21,7 @@ use intrados_xray::{
 use rayon::prelude::*;
 
 use super::case::{Case, Cracks, Grains, Pores, Rod};
-use intrados_ct::grid::{Grid as Picture, Mask};
+use intrados_raster::grid::{Grid as Picture, Mask};
 
 /// Share of the volume that grains large enough to be drawn have.
 const COARSE: f64 = 0.36;

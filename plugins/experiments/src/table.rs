@@ -1,6 +1,6 @@
 //! The table: every case by every method.
 
-use intrados_ct::grid::median;
+use intrados_raster::grid::median;
 use intrados_stage::{Job, cpu_seconds};
 use serde::{Deserialize, Serialize};
 

@@ -11,9 +11,9 @@ use super::{Batch, Found};
 use crate::{
     crack::Crack,
     detect::{Detection, Pore},
-    grid::Mask,
     picture::slice_pictures,
 };
+use intrados_raster::grid::Mask;
 
 /// Detection on its way into a set of files: each slice's labels as a 32-bit TIFF and its outlines
 /// as a PNG, and the tables of all. Slices that are done are kept in the set until it is published.

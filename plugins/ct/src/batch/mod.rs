@@ -17,10 +17,10 @@ use crate::{
     SliceError,
     crack::Crack,
     detect::{self, DetectSettings, Detection, Pore},
-    grid::Mask,
     score::{Score, SizeClass, Sizes, Tally},
     slice::{PixelFrom, Slice, Slices, read_masks_at},
 };
+use intrados_raster::grid::Mask;
 
 /// Schema of the JSON.
 pub const SCHEMA: &str = "intrados.detect/1";

@@ -15,7 +15,7 @@ use std::{ops::Range, sync::LazyLock};
 use intrados_stage::{Cancelled, Job};
 use serde::{Deserialize, Serialize};
 
-use crate::grid::{Grid, Mask};
+use intrados_raster::grid::{Grid, Mask};
 use planes::{BLOCK, Planes, Spare, TAPS};
 
 /// What a pixel can be.

@@ -23,7 +23,7 @@ use intrados_xray::{
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::grid::{Grid, Mask};
+use intrados_raster::grid::{Grid, Mask};
 
 /// Edge of a slice, pixels.
 pub const SIDE: usize = 400;

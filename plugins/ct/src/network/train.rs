@@ -10,7 +10,7 @@ use super::{
     simulate::{Noise, Plan, SIDE, Section, SimulateError, sections},
     softmax,
 };
-use crate::grid::Grid;
+use intrados_raster::grid::Grid;
 
 /// How the network came to be: recorded beside the weights, and all that is needed to make them
 /// again.

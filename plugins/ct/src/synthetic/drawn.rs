@@ -13,11 +13,8 @@ use intrados_stage::random::Key;
 use intrados_xray::specimen::concrete::wander;
 use rayon::prelude::*;
 
-use crate::{
-    crack::Crack,
-    grid::{Grid, Mask},
-    slice::Slice,
-};
+use crate::{crack::Crack, slice::Slice};
+use intrados_raster::grid::{Grid, Mask};
 
 /// What marks a drawn slice wherever a user sees it.
 pub const MARK: &str = "drawn, not scanned";

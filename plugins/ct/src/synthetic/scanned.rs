@@ -10,9 +10,9 @@ use intrados_xray::{
 
 use crate::{
     crack::{self, Crack},
-    grid::{Grid, Mask},
     slice::Slice,
 };
+use intrados_raster::grid::{Grid, Mask};
 
 /// What marks a simulated scan wherever a user sees it.
 pub const MARK: &str = "a simulated scan";

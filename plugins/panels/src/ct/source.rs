@@ -193,7 +193,7 @@ impl Read {
 
 #[cfg(test)]
 mod tests {
-    use intrados_ct::grid::Grid;
+    use intrados_raster::grid::Grid;
 
     use super::*;
 

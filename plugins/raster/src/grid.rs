@@ -178,7 +178,7 @@ impl Mask {
 
     /// Sets the enclosed gaps of at most `largest` pixels; a gap that touches the border is not
     /// enclosed.
-    pub(crate) fn fill_gaps(&mut self, largest: usize) {
+    pub fn fill_gaps(&mut self, largest: usize) {
         let gaps = self.map(|v| !v).components();
         for pixels in gaps.members {
             let enclosed =
@@ -359,12 +359,17 @@ pub fn median(values: impl Iterator<Item = f32>) -> Option<f32> {
     (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f32::total_cmp).1)
 }
 
-#[cfg(test)]
 impl Mask {
-    /// A mask as it looks: set where there is a `#`.
-    pub(crate) fn drawn(rows: &[&str]) -> Self {
+    /// A mask as it looks, rows of one length: set where there is a `#`.
+    ///
+    /// ```
+    /// let mask = intrados_raster::Mask::drawn(&["##.", "..#"]);
+    /// assert_eq!(mask.pixels(), [0, 1, 5]);
+    /// ```
+    #[must_use]
+    pub fn drawn(rows: &[&str]) -> Self {
         let data = rows.iter().flat_map(|r| r.bytes().map(|b| b == b'#')).collect();
-        Self { width: rows[0].len(), height: rows.len(), data }
+        Self { width: rows.first().map_or(0, |row| row.len()), height: rows.len(), data }
     }
 }
 

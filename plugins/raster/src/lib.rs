@@ -1,0 +1,5 @@
+#![doc = include_str!("../README.md")]
+
+pub mod grid;
+
+pub use grid::{Grid, Mask};
