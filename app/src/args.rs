@@ -262,8 +262,8 @@ pub(crate) struct Attach {
     pub(crate) project: PathBuf,
     /// Id or name of the member
     pub(crate) member: String,
-    /// CT slices or a volume of one core (.tif, .png, .mha, .dcm; others with --raw), or one table
-    /// (.csv, .tsv, .txt)
+    /// CT slices or a volume of one core (.tif, .png, .mha, .dcm; others with --raw), one table
+    /// (.csv, .tsv, .txt), or with --pose one photograph (.jpg, .png, .tif)
     #[arg(value_name = "FILE", conflicts_with = "finding", required_unless_present = "finding")]
     pub(crate) files: Vec<PathBuf>,
     /// Name, unique within the member; made of its kind or file if absent
@@ -325,6 +325,13 @@ pub(crate) struct FileArgs {
     /// CT slices: edge of a pixel, mm; what the files tell if absent
     #[arg(long, value_name = "MM", requires = "files", conflicts_with = "finding")]
     pub(crate) pixel_mm: Option<f32>,
+    /// The file is a photograph that is to be read, and this table says which places of the scene
+    /// are where in it (`intrados photo` tries it)
+    #[arg(long, value_name = "PICKS.csv", requires = "files", conflicts_with = "finding")]
+    pub(crate) pose: Option<PathBuf>,
+    /// Focal length of the photograph, pixels; what EXIF says if absent
+    #[arg(long, value_name = "PX", requires = "pose", value_parser = focal_px)]
+    pub(crate) focal_px: Option<f64>,
 }
 
 // Slices that lie behind each other.
@@ -942,13 +949,13 @@ pub(crate) enum Method {
 
 #[derive(Debug, Args)]
 pub(crate) struct Photo {
-    /// The scene that they show
+    /// The scene that they show; or the first of photographs that are read as they are, in pixels
     pub(crate) scene: PathBuf,
     /// Photographs: JPEG, PNG or TIFF
-    #[arg(value_name = "FILE", required_unless_present = "corners")]
+    #[arg(value_name = "FILE")]
     pub(crate) files: Vec<PathBuf>,
-    /// Table of picks
-    #[arg(long, value_name = "PICKS.csv", required_unless_present = "corners")]
+    /// Table of picks: which place is where in which photograph
+    #[arg(long, value_name = "PICKS.csv")]
     pub(crate) pose: Option<PathBuf>,
     /// Print the numbered corners of this member, and nothing else
     #[arg(long, value_name = "MEMBER", conflicts_with_all = ["files", "pose"])]
@@ -973,15 +980,19 @@ pub(crate) struct Photo {
     /// however brightly each burnt
     #[arg(long)]
     pub(crate) relight: bool,
+    /// Take the light off and read what the faces show then: cracks with their widths, missing
+    /// cover, rust, efflorescence
+    #[arg(long)]
+    pub(crate) read: bool,
     /// Walks a lamp and pixel of the pictures of light, which are 256 pixels wide
-    #[arg(long, value_name = "N", default_value_t = 64, requires = "relight", value_parser = value_parser!(u64).range(2..=1 << 20))]
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = value_parser!(u64).range(2..=1 << 20))]
     pub(crate) spp: u64,
     /// Standard error of where shadows lie on the faces, mm: lamps and edges are not quite where
     /// the scene has them
-    #[arg(long, value_name = "MM", default_value_t = 20.0, requires = "relight", value_parser = shadow_error_mm)]
+    #[arg(long, value_name = "MM", default_value_t = 20.0, value_parser = shadow_error_mm)]
     pub(crate) shadow_error_mm: f64,
     /// Seed of the walks
-    #[arg(long, value_name = "N", default_value_t = 1, requires = "relight")]
+    #[arg(long, value_name = "N", default_value_t = 1)]
     pub(crate) seed: u64,
     /// Folder for the files
     #[arg(long, value_name = "DIR", default_value = "out")]

@@ -449,6 +449,22 @@ fn findings_have_pictures() {
     assert!(!place.path("bridge/evidence").exists());
 }
 
+/// A photograph goes with its picks, and is refused where it cannot be placed.
+#[test]
+fn photographs_are_attached_with_their_picks() {
+    let place = Place::new();
+    let photo = place.slice("front.png");
+    let picks = place.brings("front.csv", "u,v,x,y,z\n1,2,0,0,0\n");
+    let attach = ["C1", &photo, "--pose", &picks];
+    place.refuses("attach", &attach, 65, &["front.png", "pick"]);
+    place.refuses("attach", &[&attach[..], &["--along", "0.4"]].concat(), 2, &["its picks tell"]);
+    let text = place.brings("front.heic", "ftypheic");
+    place.refuses("attach", &["C1", &text, "--pose", &picks], 65, &["front.heic"]);
+    let bad = place.brings("bad.csv", "u,v,x\n1,2,3\n");
+    place.refuses("attach", &["C1", &photo, "--pose", &bad], 65, &["bad.csv"]);
+    assert!(!place.path("bridge/evidence").exists());
+}
+
 #[test]
 fn what_lies_in_the_way_is_left_alone() {
     let place = Place::with_evidence();

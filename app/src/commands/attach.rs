@@ -3,6 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use intrados_ct::{Picture, source::SliceSource};
+use intrados_damage::photographed::{self, PhotoError};
+use intrados_photo::Photograph;
 use intrados_scene::{
     attach::{Attachment, Cut, Finding, Listed, Project, Proposal, Raw, What},
     structure::{Course, Electrode},
@@ -40,6 +42,7 @@ pub(crate) fn run(session: &Session, args: &args::Attach) -> Result<Outcome, Fai
     let progress = session.watch(format!("attaching to {}", args.project.display()));
     let proposal = project.propose(&what, &session.job)?;
     let mut notes = doubts(&proposal, &what, &args.files)?;
+    notes.extend(placed(session, &proposal, &what)?);
     notes.extend(proposal.notes.iter().cloned());
     let (name, added) = (proposal.name.clone(), proposal.added.clone());
     let files = proposal.commit()?;
@@ -75,6 +78,32 @@ fn doubts(
         doubts.extend(slice.doubt().map(|doubt| as_given(&doubt, given)));
     }
     Ok(doubts)
+}
+
+/// Refuses a photograph that cannot be placed; says from where it was taken.
+fn placed(
+    session: &Session,
+    proposal: &Proposal<'_>,
+    what: &Attachment,
+) -> Result<Option<String>, Failure> {
+    let What::Photograph { files, .. } = &what.what else { return Ok(None) };
+    let all = &proposal.scene.structure.photographs;
+    let ours = all.iter().find(|p| p.member == what.member && p.name == proposal.name);
+    let Some(photo) = ours else { return Ok(None) };
+    match photographed::placed(&proposal.scene, photo, &session.job) {
+        Ok((_, _, located)) => {
+            let [x, y, z] = located.pose.position.to_array();
+            let rms = located.rms_px;
+            Ok(Some(format!("taken from ({x:.2}, {y:.2}, {z:.2}) m, picks fit to {rms:.1} pixels")))
+        }
+        Err(PhotoError::Cancelled(_)) => Err(Failure::Interrupted),
+        Err(PhotoError::Because(why)) => {
+            let given = as_given(&why, files);
+            let named = files.iter().any(|f| given.contains(&f.display().to_string()));
+            let line = if named { given } else { format!("{}: {given}", files[0].display()) };
+            Err(Failure::BadInput(line))
+        }
+    }
 }
 
 /// A message about a copy, about the file that it was made of.
@@ -141,6 +170,9 @@ fn what(args: &args::Attach) -> Result<What, Failure> {
         return single(f, finding);
     }
     none_of(&[(f.std_error.is_some(), "--std-error is of a finding; a table has its column")])?;
+    if let Some(picks) = &args.of_file.pose {
+        return photograph(args, picks);
+    }
     if args.stack.raw.is_some() {
         return slices(args, &args.files);
     }
@@ -164,6 +196,33 @@ fn none_of(options: &[(bool, &str)]) -> Result<(), Failure> {
         Some((_, option)) => Err(Failure::Usage(format!("{option}: leave it out"))),
         None => Ok(()),
     }
+}
+
+/// A photograph that is read.
+fn photograph(args: &args::Attach, picks: &Path) -> Result<What, Failure> {
+    let (place, of) = (&args.place, &args.of_file);
+    none_of(&[
+        (place.along.is_some(), "--along: where a photograph looks, its picks tell"),
+        (place.face.is_some() || place.angle.is_some(), "--face and --angle: its picks tell"),
+        (place.height.is_some(), "--height: its picks tell"),
+        (place.instrument.is_some(), "--instrument is of a finding or of a table"),
+        (args.stack.stack || args.stack.raw.is_some(), "--stack and --raw are of CT slices"),
+        (of.pixel_mm.is_some(), "--pixel-mm is of CT slices"),
+        (
+            of.unit.is_some() || of.kind.is_some() || of.test.is_some(),
+            "--unit, --kind and --test are of tables",
+        ),
+    ])?;
+    let [file] = &args.files[..] else {
+        return Err(Failure::Usage(
+            "a photograph is attached alone: give one command to each".into(),
+        ));
+    };
+    Photograph::open(file).map_err(|error| {
+        let line = format!("{}: {error}", file.display());
+        if error.is_missing() { Failure::NoInput(line) } else { Failure::BadInput(line) }
+    })?;
+    Ok(What::Photograph { files: [file.clone(), picks.to_owned()], focal_px: of.focal_px })
 }
 
 fn load_test(args: &args::Attach, force_kn: f64) -> Result<What, Failure> {

@@ -1,5 +1,6 @@
 //! `intrados photo`: where photographs were taken from, and the faces that they show, unrolled.
 
+mod read;
 mod relit;
 
 use std::{collections::BTreeSet, path::Path};
@@ -28,6 +29,7 @@ use crate::{
     picture::{Facts, png_of_colours},
     session::{Session, one_line},
 };
+use read::FaceRead;
 use relit::{Kept, MergedFace};
 
 /// Standard error of k1 before anything is picked: barrels of zooms at their wide end reach some
@@ -69,6 +71,9 @@ struct Placed {
     /// Why the light stays.
     #[serde(skip_serializing_if = "Option::is_none")]
     not_relit: Option<String>,
+    /// What faces show once it is off.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    read: Vec<FaceRead>,
 }
 
 /// A photograph that was not.
@@ -102,10 +107,20 @@ struct Work<'a> {
 }
 
 pub(crate) fn run(session: &Session, args: &args::Photo) -> Result<Outcome, Failure> {
+    if read::is_photograph(&args.scene) {
+        return read::bare(session, args);
+    }
     let scene = walks::load(session, &args.scene)?;
     let site = Site::new(&scene, &session.job)?;
     if let Some(member) = &args.corners {
         return corners(session, &scene, &site, member);
+    }
+    if args.files.is_empty() {
+        return Err(Failure::Usage("give photographs of the scene".into()));
+    }
+    if args.pose.is_none() {
+        let line = "give --pose PICKS.csv: which places of the scene are where in the photographs";
+        return Err(Failure::Usage(line.into()));
     }
     let picks = match &args.pose {
         Some(table) => picks::read(table, &scene, &site)?,
@@ -217,10 +232,7 @@ impl Work<'_> {
         kept: &mut Kept,
     ) -> Result<Placed, Failure> {
         let bad = |why: &dyn std::fmt::Display| format!("{}: {why}", file.display());
-        let photograph = Photograph::open(file).map_err(|error| match error.is_missing() {
-            true => Failure::NoInput(bad(&error)),
-            false => Failure::BadInput(bad(&error)),
-        })?;
+        let photograph = open(file)?;
         for note in &photograph.notes {
             tracing::info!("{name}: {note}");
         }
@@ -247,6 +259,7 @@ impl Work<'_> {
         )?;
         let shot = (&photograph, &located);
         let (relit, not_relit) = self.relight(name, shot)?;
+        let read = self.read(name, stem, relit.as_ref(), shot, files)?;
         let mut faces = Vec::new();
         for seen in seen.iter().filter(|seen| self.member.is_none_or(|m| m == seen.member)) {
             let Some(surface) = self.site.surface(seen.member) else { continue };
@@ -282,6 +295,7 @@ impl Work<'_> {
             faces,
             relit: relit.as_ref().map(intrados_photo::relight::Relit::record),
             not_relit,
+            read,
         })
     }
 
@@ -348,6 +362,15 @@ impl Work<'_> {
     }
 }
 
+/// Opens a photograph.
+fn open(file: &Path) -> Result<Photograph, Failure> {
+    let bad = |why: &dyn std::fmt::Display| format!("{}: {why}", file.display());
+    Photograph::open(file).map_err(|error| match error.is_missing() {
+        true => Failure::NoInput(bad(&error)),
+        false => Failure::BadInput(bad(&error)),
+    })
+}
+
 /// BLAKE3 of a file.
 fn hash(path: &Path) -> Result<String, Failure> {
     let (file, _) =
@@ -374,6 +397,7 @@ impl Report {
             );
             text += &output::table(&rows(&photo.faces));
             photo.relit.iter().for_each(|relit| text += &relit::lines(relit));
+            text += &read::lines(&photo.read);
         }
         self.merged.iter().for_each(|merged| text += &merged.line());
         self.unused.iter().for_each(|u| text += &format!("not used, because {}\n", u.because));

@@ -8,6 +8,7 @@ pub mod gauges;
 pub mod grading;
 pub mod ledger;
 pub mod monitoring;
+pub mod photographed;
 mod plugin;
 pub mod predict;
 mod reach;

@@ -424,7 +424,7 @@ impl LitScene {
     }
 
     /// Its place among the scene's objects.
-    pub(crate) fn object_index(&self, triangle: u32) -> u32 {
+    pub fn object_index(&self, triangle: u32) -> u32 {
         self.places[triangle as usize][0]
     }
 

@@ -165,6 +165,24 @@ impl Surface {
         [across, p.dot(self.axis)]
     }
 
+    /// Of all of it but its ends, m².
+    #[must_use]
+    pub fn area_m2(&self) -> f64 {
+        let area = |corners: &[Vec3; 3]| {
+            let [a, b, c] = corners.map(|p| p.as_dvec3());
+            let doubled = (b - a).cross(c - a);
+            let is_end = doubled.dot(self.axis).abs() > OWN * doubled.length();
+            if is_end { 0.0 } else { 0.5 * doubled.length() }
+        };
+        self.triangles.iter().map(area).sum()
+    }
+
+    /// Of the member's axis, m.
+    #[must_use]
+    pub fn length(&self) -> f64 {
+        self.length
+    }
+
     /// What of the surface lies at places (across, along, m) of a face; `None` where nothing does.
     pub(crate) fn spots(
         &self,

@@ -10,9 +10,11 @@ use intrados_ct::{
     synthetic::drawn::MARK,
 };
 use intrados_damage::{
+    Evidence,
     forecast::FORECAST,
     gauges::{GAUGES, GaugeReading},
     ledger::Group,
+    photographed::PHOTOGRAPHED,
     predict::{Defect, MemberPrediction, Origin, Prediction, SliceReading},
     survey::SURVEY,
     verdict::{Basis, NAMED},
@@ -433,7 +435,7 @@ impl<'a> Page<'a> {
 
     /// The share of bars' section that was taken for lost before the last inspection, %.
     fn before_the_last(&self, m: &MemberPrediction) -> Option<String> {
-        let before = m.evidence.get(SURVEY)?.details.get("rust_before_the_last_inspection")?;
+        let before = surveyed(m)?.details.get("rust_before_the_last_inspection")?;
         let [value, error] =
             [before["value"].as_f64()?, before["std_error"].as_f64()?].map(|x| 100.0 * x);
         Some(format!("{value:.1} ± {error:.1}"))
@@ -602,9 +604,14 @@ fn section(s: &SliceReading, worst: f64) -> Section<'_> {
     }
 }
 
+/// What was seen on a member: by inspectors with their photographs, or in photographs alone.
+fn surveyed(m: &MemberPrediction) -> Option<&Evidence> {
+    m.evidence.get(SURVEY).or_else(|| m.evidence.get(PHOTOGRAPHED))
+}
+
 /// How much of the bars is lost at each date of inspection, and some years on.
 fn course(m: &MemberPrediction) -> Vec<svg::Point> {
-    let rust = m.evidence.get(SURVEY).and_then(|e| e.details.get("rust"));
+    let rust = surveyed(m).and_then(|e| e.details.get("rust"));
     let points = rust.and_then(|rust| rust["course"].as_array());
     let one = |p: &serde_json::Value| {
         let number = |name: &str| p[name].as_f64();

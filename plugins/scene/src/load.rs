@@ -372,8 +372,15 @@ impl Sources {
         }
     }
 
-    /// The evidence beside the scene, if there is some; none beside a bundled scene.
-    pub(crate) fn evidence(&self) -> Option<PathBuf> {
+    /// The evidence beside the scene, if there is some: that of all scenes of its folder, and for
+    /// `X.ron` `X.evidence.ron`; none beside a bundled scene.
+    pub(crate) fn evidence(&self) -> impl Iterator<Item = PathBuf> {
+        let is_scene = self.given.extension().is_some_and(|e| e.eq_ignore_ascii_case("ron"));
+        let own = is_scene.then(|| self.given.with_extension(evidence::NAME));
+        self.of_folder().into_iter().chain(own.filter(|path| path.exists()))
+    }
+
+    fn of_folder(&self) -> Option<PathBuf> {
         let path = self.folder.join(evidence::NAME);
         let there = self.proposed.is_some() || path.exists();
         (there && !self.given.as_os_str().is_empty()).then_some(path)
@@ -426,7 +433,7 @@ impl Sources {
     /// Reads a file and adds it to the hash.
     pub(crate) fn read(&mut self, path: &Path, limit: u64) -> Result<Vec<u8>, LoadError> {
         let proposed =
-            self.proposed.as_ref().filter(|_| self.evidence().is_some_and(|e| e == path));
+            self.proposed.as_ref().filter(|_| self.of_folder().is_some_and(|e| e == path));
         let read = if let Some(text) = proposed {
             Ok(text.clone().into_bytes())
         } else if path == self.given {

@@ -5,7 +5,7 @@ use std::{fs, path::Path};
 
 use intrados_scene::{
     ErrorKind, LoadError, Scene, Slices,
-    structure::{Course, Direction, Electrode, Measures, Observation, Shows},
+    structure::{Course, Direction, Electrode, Measures, Observation, Shows, usual},
 };
 use intrados_stage::Job;
 
@@ -126,7 +126,7 @@ fn every_kind_becomes_an_observation_with_the_usual_error() {
     assert_eq!(*shows[8], width);
     // Of what stands, a height is a place on the axis.
     assert!((all[8].spot.along[0] - 0.4).abs() < 1e-6 && all[8].spot.height_m == Some(1.2));
-    assert_eq!(*shows[13], Shows::Intact);
+    assert_eq!(*shows[13], Shows::Intact { seen: 1.0, limit_mm: usual::FOUND_MM });
 }
 
 /// By the concrete's own cement, 230 in 2300 kg; where the scene knows none, by 350 in 2400, said.
@@ -313,8 +313,8 @@ fn gauges_are_read_in_their_units() {
     assert!((micro.value - 41.5e-6).abs() < 1e-18 && (micro.std_error - 1e-6).abs() < 1e-18);
     assert_eq!((micro.of.as_str(), micro.test.as_deref()), ("SG1", Some("truck")));
     assert_eq!(readings("unit: \"µε\",")[0].value, micro.value);
-    let usual = table("unit: \"ue\",", "gauge,value\nSG1,100\n").load().unwrap();
-    assert!((usual.structure.readings[0].std_error - 2e-6).abs() < 1e-18);
+    let plain = table("unit: \"ue\",", "gauge,value\nSG1,100\n").load().unwrap();
+    assert!((plain.structure.readings[0].std_error - 2e-6).abs() < 1e-18);
 }
 
 /// Where a gauge is may be said in its table; then nobody need define it elsewhere.
@@ -446,6 +446,35 @@ fn faults_of_tables_are_named_with_line_and_column() {
     let place = Place::new(other);
     place.write("t.csv", "gauge,value\nSG1,5\n");
     assert!(place.problems()[0].contains("SG1 is on C1, not on B1"), "{:?}", place.problems());
+}
+
+#[test]
+fn photographs_come_with_their_picks() {
+    let photo = |fields: &str| {
+        format!("photographs: [(file: \"p.jpg\", picks: \"p.csv\", name: \"front\", {fields})],")
+    };
+    let place = Place::new(&photo("member: \"C1\", date: \"2026-05-03\", picking_px: 4"));
+    assert!(place.problems()[0].contains("photographs[0].file"), "{:?}", place.problems());
+    place.write("p.jpg", "a picture that nobody opens yet");
+    assert!(place.problems()[0].contains("photographs[0].picks"), "{:?}", place.problems());
+    place.write("p.csv", "u,v,x,y,z\n");
+    let scene = place.load().unwrap();
+    let [read] = &scene.structure.photographs[..] else { panic!("one photograph") };
+    assert_eq!((read.member.as_str(), read.name.as_str(), read.picking_px), ("C1", "front", 4.0));
+    assert!(read.file.ends_with("p.jpg") && read.picks.ends_with("p.csv"));
+    assert_eq!(read.shadow_error_m, 0.02);
+    // What they hold is part of the scene.
+    place.write("p.jpg", "another picture");
+    assert_ne!(place.load().unwrap().hash, scene.hash);
+    for (fields, said) in [
+        ("member: \"X9\"", "X9"),
+        ("member: \"C1\", picking_px: 0", "picking_px"),
+        ("member: \"C1\", focal_px: 2", "focal_px"),
+        ("member: \"C1\", shadow_error_mm: -1", "shadow_error_mm"),
+    ] {
+        place.write("evidence.ron", evidence(&photo(fields)));
+        assert!(place.problems()[0].contains(said), "{fields}: {:?}", place.problems());
+    }
 }
 
 #[test]

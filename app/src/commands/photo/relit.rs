@@ -84,7 +84,7 @@ impl Work<'_> {
         name: &str,
         shot: (&Photograph, &Located),
     ) -> Result<(Option<Relit>, Option<String>), Failure> {
-        if !self.args.relight {
+        if !self.args.relight && !self.args.read {
             return Ok((None, None));
         }
         let settings = RelightSettings {

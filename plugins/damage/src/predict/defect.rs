@@ -13,6 +13,7 @@ use intrados_ct::Picture;
 
 use super::{CT, SliceReading, section::widest};
 use crate::{
+    photographed::PHOTOGRAPHED,
     survey::{self, SURVEY},
     zone::zone_at,
 };
@@ -57,15 +58,21 @@ impl Defect {
     }
 }
 
-/// All that was found on a member, by eyes and hammers first, then by CT.
+/// All that was found on a member, by eyes and hammers first, then by photographs, then by CT.
 #[must_use]
-pub(crate) fn defects(scene: &Scene, member: &str, slices: &[SliceReading]) -> Vec<Defect> {
-    let seen = survey::of_member(scene, member).filter_map(|(_, o)| seen(o));
-    seen.chain(grouped(slices).iter().flat_map(|group| sectioned(group))).collect()
+pub(crate) fn defects(
+    scene: &Scene,
+    member: &str,
+    photographed: &[Observation],
+    slices: &[SliceReading],
+) -> Vec<Defect> {
+    let seen = survey::of_member(scene, member).filter_map(|(_, o)| seen(SURVEY, o));
+    let shown = photographed.iter().filter_map(|o| self::seen(PHOTOGRAPHED, o));
+    seen.chain(shown).chain(grouped(slices).iter().flat_map(|group| sectioned(group))).collect()
 }
 
 /// What an observation found; none where it is a reading of an instrument, or where nothing was.
-fn seen(o: &Observation) -> Option<Defect> {
+fn seen(source: &'static str, o: &Observation) -> Option<Defect> {
     let mut defect = Defect {
         kind: "",
         along: o.spot.is_placed().then(|| o.spot.along.map(f64::from)),
@@ -74,7 +81,7 @@ fn seen(o: &Observation) -> Option<Defect> {
         width_mm: None,
         length_m: None,
         area_m2: None,
-        source: SURVEY,
+        source,
         item: o.name.clone(),
         date: o.date.map(|d| d.to_string()),
         picture: None,

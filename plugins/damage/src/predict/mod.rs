@@ -15,7 +15,10 @@ use std::{
 };
 
 use intrados_mechanics::{frame, member::Handed};
-use intrados_scene::{Assembly, Damage, Member, MemberKind, Scene, structure::Matter};
+use intrados_scene::{
+    Assembly, Damage, Member, MemberKind, Scene,
+    structure::{Course, Matter, Observation, Shows},
+};
 use intrados_stage::{Cancelled, Estimate, Job, file::Set};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -28,6 +31,7 @@ use crate::{
     grading::Profile,
     ledger,
     monitoring::{self, MONITORING},
+    photographed::{self, PHOTOGRAPHED, PhotoError},
     score::{Cases, MemberScore, Outcome},
     survey::{self, SURVEY, Surveyed, surveyed},
     truth,
@@ -241,6 +245,8 @@ pub struct Predictor {
     unmonitored: BTreeMap<String, String>,
     /// What gauges read, by member.
     measured: BTreeMap<usize, Vec<GaugeReading>>,
+    /// What photographs show, by member.
+    photographed: BTreeMap<usize, Vec<Observation>>,
     /// Observations that count for nothing, by their number, and why.
     unheard: BTreeMap<usize, String>,
     /// Items of outside sources that count for nothing, by piece and number, and why.
@@ -277,6 +283,8 @@ enum Item {
     Slice(SliceSource),
     Life(String),
     Gauges(usize),
+    /// A photograph of a member, by their numbers.
+    Photograph(usize, usize),
     /// What instruments and eyes found on a member.
     Survey(usize),
     /// What an outside source has of a member, by its names.
@@ -290,6 +298,7 @@ impl Item {
             Self::Slice(slice) if slice.origin() == Origin::Scanned => 40.0,
             Self::Slice(_) | Self::Outside(..) => 1.0,
             Self::Gauges(_) | Self::Survey(_) => 5.0,
+            Self::Photograph(..) => 40.0,
             Self::Life(_) => 30.0,
         }
     }
@@ -311,8 +320,16 @@ impl Predictor {
             read.contains(scene.members[i].id.as_str()) || gauges::can_simulate(scene, i)
         };
         queue.extend((0..scene.members.len()).filter(felt).map(Item::Gauges));
-        let is_surveyed =
-            |&i: &usize| survey::of_member(scene, &scene.members[i].id).next().is_some();
+        let photographs =
+            scene.structure.photographs.iter().enumerate().filter_map(|(k, p)| {
+                Some((k, scene.members.iter().position(|m| m.id == p.member)?))
+            });
+        let photographs: Vec<(usize, usize)> = photographs.collect();
+        queue.extend(photographs.iter().map(|(k, member)| Item::Photograph(*k, *member)));
+        let is_surveyed = |&i: &usize| {
+            survey::of_member(scene, &scene.members[i].id).next().is_some()
+                || photographs.iter().any(|(_, member)| *member == i)
+        };
         queue.extend((0..scene.members.len()).filter(is_surveyed).map(Item::Survey));
         for source in &sources.0 {
             let items = (0..scene.members.len())
@@ -338,6 +355,7 @@ impl Predictor {
             unfelt: BTreeMap::new(),
             unmonitored: BTreeMap::new(),
             measured: BTreeMap::new(),
+            photographed: BTreeMap::new(),
             unheard: BTreeMap::new(),
             unused: BTreeMap::new(),
             lives: BTreeMap::new(),
@@ -387,6 +405,7 @@ impl Predictor {
             Some(Item::Life(_)) => self.label_of(&self.lives()),
             Some(Item::Gauges(_)) => "what gauges felt".into(),
             Some(Item::Survey(_)) => "what was surveyed".into(),
+            Some(Item::Photograph(..)) => "what a photograph shows".into(),
             Some(Item::Outside(source, ..)) => format!("what {} says", source.name()),
             None => String::new(),
         }
@@ -441,6 +460,7 @@ impl Predictor {
             Item::Life(_) => self.foretell(scene, &lives, &job),
             Item::Gauges(member) => self.feel(scene, member, &job),
             Item::Survey(member) => self.survey(scene, member, &job),
+            Item::Photograph(photo, member) => self.behold(scene, photo, member, &job),
             Item::Outside(source, member, _) => self.ask(scene, source.as_ref(), member, &job),
         };
         if let Err(why) = &done {
@@ -558,9 +578,32 @@ impl Predictor {
         Ok(())
     }
 
-    /// Reads what instruments and eyes found on a member.
+    /// Reads what a photograph shows of its member.
+    fn behold(
+        &mut self,
+        scene: &Scene,
+        photo: usize,
+        member: usize,
+        job: &Job,
+    ) -> Result<(), PredictError> {
+        let Some(photo) = scene.structure.photographs.get(photo) else { return Ok(()) };
+        match photographed::observed(scene, photo, job) {
+            Ok(found) => self.photographed.entry(member).or_default().extend(found),
+            Err(PhotoError::Cancelled(cancelled)) => return Err(cancelled.into()),
+            Err(PhotoError::Because(why)) => self.fates[self.next - 1] = Some(why),
+        }
+        Ok(())
+    }
+
+    /// Reads what instruments, eyes and photographs found on a member.
     fn survey(&mut self, scene: &Scene, member: usize, job: &Job) -> Result<(), PredictError> {
-        match surveyed(scene, member, &self.settings.profile, job) {
+        let photographed = self.photographed.get(&member).map_or(&[][..], Vec::as_slice);
+        if photographed.is_empty()
+            && survey::of_member(scene, &scene.members[member].id).next().is_none()
+        {
+            return Ok(());
+        }
+        match surveyed(scene, member, photographed, &self.settings.profile, job) {
             Ok(Surveyed { evidence, unused }) => {
                 self.unheard.extend(unused);
                 self.told.extend(evidence.map(|e| (member, e)));
@@ -581,7 +624,8 @@ impl Predictor {
     ) -> Result<(), PredictError> {
         let (piece, name) = (self.next - 1, source.name());
         let earlier = |item: &Item| matches!(item, Item::Outside(other, m, _) if *m == member && other.name() == name);
-        if [CT, GAUGES, FORECAST, SURVEY].contains(&name) || self.queue[..piece].iter().any(earlier)
+        if [CT, GAUGES, FORECAST, SURVEY, PHOTOGRAPHED].contains(&name)
+            || self.queue[..piece].iter().any(earlier)
         {
             self.fates[piece] = Some(format!(
                 "another source of evidence is called \"{name}\": give this one a name of its own"
@@ -632,6 +676,8 @@ impl Predictor {
                 let gauges = self.measured.get(member).cloned().unwrap_or_default();
                 Some(Done { fate, evidence, unused, gauges, ..Done::default() })
             }
+            // It rests on photographs, which are not kept.
+            Item::Survey(member) if self.photographed.contains_key(member) => None,
             Item::Survey(member) => {
                 let id = &scene.members.get(*member)?.id;
                 let unused = survey::of_member(scene, id)
@@ -640,7 +686,7 @@ impl Predictor {
                 let evidence = self.kept(*member, SURVEY)?;
                 Some(Done { fate, evidence, unused, ..Done::default() })
             }
-            Item::Life(_) | Item::Outside(..) => None,
+            Item::Life(_) | Item::Outside(..) | Item::Photograph(..) => None,
         }
     }
 
@@ -670,7 +716,7 @@ impl Predictor {
                 self.told.extend(said.map(|e| (*member, e)));
                 self.unheard.extend(unused);
             }
-            Item::Life(_) | Item::Outside(..) => return None,
+            Item::Life(_) | Item::Outside(..) | Item::Photograph(..) => return None,
         }
         self.next += 1;
         self.fates.resize(self.next, fate);
@@ -844,6 +890,17 @@ impl Predictor {
                         put(*member, id, SURVEY, survey::name(observation), why);
                     }
                 }
+                Item::Photograph(photo, member) => {
+                    let Some(photo) = scene.structure.photographs.get(*photo) else { continue };
+                    // Where others looked, too, it is part of what they say.
+                    let source = match fate(*member, PHOTOGRAPHED) {
+                        Some(_) => PHOTOGRAPHED,
+                        None => SURVEY,
+                    };
+                    let id = &scene.members[*member].id;
+                    let why = why(piece, *member, source);
+                    put(*member, id, PHOTOGRAPHED, photographed::name(photo), why);
+                }
                 Item::Outside(source, member, items) => {
                     for (n, item) in items.iter().enumerate() {
                         let own = self.unused.get(&(piece, n)).cloned();
@@ -899,6 +956,10 @@ impl Predictor {
             .values()
             .filter_map(|e| Some((e.source, e.crack_width_mm?)))
             .max_by(|a, b| a.1.total_cmp(&b.1));
+        let found = survey::of_member(scene, &member.id).map(|(_, o)| o);
+        let photographed = self.photographed.get(&index).map_or(&[][..], Vec::as_slice);
+        let mut conflicts = whole.conflicts.clone();
+        conflicts.extend(unforeseen(found.chain(photographed), evidence.get(FORECAST)));
         MemberPrediction {
             id: member.id.clone(),
             name: member.name.clone(),
@@ -916,13 +977,13 @@ impl Predictor {
             within_months: verdict.within_months,
             states: shares(&whole, profile),
             crack_check: widest.and_then(|widest| crack_check(scene, member, widest, profile)),
-            conflict: !whole.conflicts.is_empty(),
+            conflict: !conflicts.is_empty(),
             zones: whole.zones,
             causes: whole.causes,
             worst_zone: whole.worst,
-            conflicts: whole.conflicts,
+            conflicts,
             truth: self.truth(member, &self.readings[index]),
-            defects: defects(scene, &member.id, &self.readings[index]),
+            defects: defects(scene, &member.id, photographed, &self.readings[index]),
             gauges: self.measured.get(&index).cloned().unwrap_or_default(),
             evidence,
             slices: self.readings[index].clone(),
@@ -986,6 +1047,30 @@ impl Predictor {
             },
         })
     }
+}
+
+/// Diagonal cracks that the member's life, as it was computed, does not open: shear that nobody
+/// foretold, or ground that gave way. Each in words.
+fn unforeseen<'a>(
+    found: impl Iterator<Item = &'a Observation>,
+    forecast: Option<&Evidence>,
+) -> Vec<String> {
+    let Some(forecast) = forecast else { return Vec::new() };
+    let foretold = forecast.crack_width_mm.unwrap_or(0.0);
+    let one = |o: &Observation| match o.shows {
+        Shows::Crack { width_mm, std_error_mm, course: Course::Diagonal, .. }
+            if width_mm - 1.96 * std_error_mm > foretold =>
+        {
+            let [from, to] = o.spot.along;
+            Some(format!(
+                "{}: a diagonal crack {width_mm:.2} ± {std_error_mm:.2} mm wide at {:.2} of the axis, where the forecast opens none wider than {foretold:.2} mm",
+                o.name,
+                0.5 * (from + to),
+            ))
+        }
+        _ => None,
+    };
+    found.filter_map(one).collect()
 }
 
 /// What the rest of the structure does to a model; where members bear as one but this one is no

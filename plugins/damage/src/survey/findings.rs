@@ -18,6 +18,9 @@ const COVER: f64 = 0.04;
 /// What is left open where somebody looked and found nothing: of sections an eye sees the outside.
 const LOOKED: f64 = 0.05;
 
+/// What may be lost where nobody looked: as of a member that nothing is known of (ours).
+const UNSEEN: f64 = 0.15;
+
 /// Whether it was found by going over the member.
 pub(super) fn is_seen(shows: &Shows) -> bool {
     matches!(
@@ -28,7 +31,7 @@ pub(super) fn is_seen(shows: &Shows) -> bool {
             | Shows::Efflorescence { .. }
             | Shows::WetSpot { .. }
             | Shows::Sounding { .. }
-            | Shows::Intact
+            | Shows::Intact { .. }
     )
 }
 
@@ -83,7 +86,10 @@ fn one(site: &Site, zone: usize, shows: &Shows, rule: &GradingRule) -> Option<Es
             None => off(area_m2, 0.7 * cover, 0.5),
         }),
         Shows::Sounding { hollow_m2, .. } if hollow_m2 > 0.0 => Some(off(hollow_m2, cover, 0.5)),
-        Shows::Sounding { .. } | Shows::Intact => Some(Estimate { value: 0.0, std_error: LOOKED }),
+        Shows::Sounding { .. } => Some(Estimate { value: 0.0, std_error: LOOKED }),
+        Shows::Intact { seen, .. } => {
+            Some(Estimate { value: 0.0, std_error: LOOKED.hypot(UNSEEN * (1.0 - seen)) })
+        }
         _ => None,
     }
 }

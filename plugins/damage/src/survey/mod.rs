@@ -31,6 +31,7 @@ use crate::{
     evidence::{Cause, Evidence},
     forecast::{self, BarsOf, FORECAST, ForecastError},
     grading::Profile,
+    photographed::PHOTOGRAPHED,
     reach::{Field, Word},
     zone::{ZONES, Zones, middle, place, zone_at},
 };
@@ -119,18 +120,22 @@ impl Site {
     }
 }
 
-/// Reads all observations of a member.
+/// Reads all observations of a member: those of the scene, and those that were made of photographs,
+/// which are numbered after them.
 ///
 /// # Errors
 /// The job was cancelled.
 pub fn surveyed(
     scene: &Scene,
     index: usize,
+    photographed: &[Observation],
     profile: &Profile,
     job: &Job,
 ) -> Result<Surveyed, ForecastError> {
     let member = &scene.members[index];
-    let all: Vec<(usize, &Observation)> = of_member(scene, &member.id).collect();
+    let mut all: Vec<(usize, &Observation)> = of_member(scene, &member.id).collect();
+    let source = if all.is_empty() { PHOTOGRAPHED } else { SURVEY };
+    all.extend((scene.structure.observations.len()..).zip(photographed));
     let mut said = Said::default();
     said.unused.extend(all.iter().filter_map(|(number, o)| Some((*number, refusal(o)?))));
     let placed = placed(&all);
@@ -152,7 +157,7 @@ pub fn surveyed(
     said.put(Cause::Concrete, &together(&strengths, &findings), profile, &site);
     let heard = |p: &&Placed| !said.unused.contains_key(&p.number);
     let used: Vec<&Placed> = placed.iter().filter(heard).collect();
-    let Some(mut evidence) = said.evidence(basis(&used, &steel)) else {
+    let Some(mut evidence) = said.evidence(source, basis(&used, &steel)) else {
         let why = "nothing of it speaks of damage";
         let all = placed.iter().map(|p| (p.number, why.to_owned()));
         let mut unused: BTreeMap<usize, String> = all.collect();
@@ -266,10 +271,10 @@ impl Said {
         self.stands.insert(cause, field.stands(&words));
     }
 
-    fn evidence(&mut self, basis: String) -> Option<Evidence> {
+    fn evidence(&mut self, source: &'static str, basis: String) -> Option<Evidence> {
         let mut zones = std::mem::take(&mut self.zones);
         zones.retain(|_, zones| zones.worst().is_some());
-        let mut evidence = Evidence::new(SURVEY, true, zones, basis)?;
+        let mut evidence = Evidence::new(source, true, zones, basis)?;
         evidence.stands = std::mem::take(&mut self.stands);
         if evidence.zones.contains_key(&Cause::Steel) {
             evidence.includes = vec![(Cause::Steel, FORECAST.to_owned())];

@@ -8,7 +8,7 @@
 //! | chloride | normal about Fick's profile beneath what splashes; the model is 15 % off | ours |
 //! | half-cell | 1/(1 + exp((E + 275 mV)/34.1 mV)) of rust: 10 % at −200, 90 % at −350 mV, never nearer to sure than 5 % | ASTM C876, appendix; logistic between, ours |
 //! | crack along | lognormal (.5) about w = .0575 mm⁻¹ (ΔA − ΔA₀), ΔA₀ at (7.53 + 9.32 c/φ) µm; one in ten has other causes | Vidal et al. 2004, Alonso et al. 1998; shares ours |
-//! | intact | no crack that an eye finds: half of them at .15 mm | ours |
+//! | intact | no crack that an eye finds: half of them at .15 mm; by a photograph, on the share of the surface that it shows, at the width that it could have shown | ours |
 //! | hollow | half of what is cracked to .4 mm | ours |
 //! | spall | half of what is cracked to 1 mm, the width taken as spalling | Vu, Stewart and Mullard 2005; curve ours |
 //! | rust stains | half of what is cracked to .2 mm, fewer without cracks | ours |
@@ -303,7 +303,9 @@ fn logarithm(shows: &Shows, draw: &Possible, bars: &Bars, outer: f64, age: f64) 
             if draw.other.is_active(bars.cover, age) { rusts } else { 1.0 - rusts }
         }
         Shows::Crack { width_mm, std_error_mm, .. } => along(*width_mm, *std_error_mm, width()),
-        Shows::Intact => (1.0 - half_at(width(), 0.15, 0.4)) * (1.0 - OTHER_CAUSES),
+        Shows::Intact { seen, limit_mm } => {
+            (1.0 - seen * half_at(width(), *limit_mm, 0.4)) * (1.0 - seen * OTHER_CAUSES)
+        }
         Shows::Sounding { hollow_m2, tapped_m2 } => {
             let hollow = 0.03 + 0.94 * half_at(width(), 0.4, 0.5);
             let share = (hollow_m2 / tapped_m2.max(1e-9)).clamp(0.0, 1.0);

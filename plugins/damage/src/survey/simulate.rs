@@ -3,7 +3,7 @@
 //! knows neither, and nothing here is used by it.
 
 use intrados_mechanics::material::durability::{Attack, Bars, Corrosion};
-use intrados_scene::structure::{Course, Electrode, Shows};
+use intrados_scene::structure::{Course, Electrode, Shows, usual};
 use intrados_stage::{Estimate, random::Key, time::YEAR};
 use statrs::distribution::{Beta, ContinuousCDF, Normal};
 
@@ -112,7 +112,7 @@ const RUSTING: [(&str, &str, Rusting); 10] = [
     ("intact", "XD3", |truth, bars, dice| {
         let rust = rust::crack_mm(truth, bars, AGE);
         let is_cracked = dice.happens(rust::half_at(rust, 0.15, 0.4)) || dice.happens(0.1);
-        (!is_cracked).then_some(Shows::Intact)
+        (!is_cracked).then_some(Shows::Intact { seen: 1.0, limit_mm: usual::FOUND_MM })
     }),
     ("sounding", "XD3", |truth, bars, dice| {
         let rust = rust::crack_mm(truth, bars, AGE);

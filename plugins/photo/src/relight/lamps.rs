@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use glam::Vec3;
-use intrados_scene::{Mesh, Object, Part, Scene};
+use intrados_scene::{LampKind, Mesh, Object, Part, Scene};
 
 /// Lamps that are surfaces are told apart up to so many; of more, those of one material are one.
 const MOST_SINGLE: usize = 12;
@@ -70,6 +70,7 @@ pub(super) fn evened(scene: &Scene) -> Scene {
             let texture = texture.and_then(|t| scene.textures.get(t.texture));
             material.base_colour *= texture.map_or(Vec3::ONE, |t| mean(&t.texels));
             material.normal_texture = None;
+            material.finish = None;
             let mesh = &scene.meshes[object.mesh];
             if !mesh.colours.is_empty() {
                 material.base_colour *= mean(&mesh.colours);
@@ -98,4 +99,27 @@ pub(super) fn alone(even: &Scene, source: &Source) -> Scene {
     let beam = source.beam.and_then(|i| even.lamps.get(i));
     dark.lamps = beam.cloned().into_iter().collect();
     dark
+}
+
+/// An [evened] scene whose lamps burn as brightly as was found, by source; those of which nothing
+/// is known do not.
+pub(super) fn burning(even: &Scene, sources: &[(Source, Vec3)]) -> Scene {
+    let mut lit = even.clone();
+    let of = |is_it: &dyn Fn(&Source) -> bool| {
+        sources.iter().find(|(source, _)| is_it(source)).map_or(Vec3::ZERO, |(_, by)| *by)
+    };
+    for (i, object) in even.objects.iter().enumerate() {
+        lit.materials[object.material].emission *= of(&|source| source.objects.contains(&i));
+    }
+    for (i, lamp) in lit.lamps.iter_mut().enumerate() {
+        let by = of(&|source| source.beam == Some(i));
+        match &mut lamp.kind {
+            LampKind::Point { intensity, .. } | LampKind::Spot { intensity, .. } => {
+                *intensity *= by
+            }
+            LampKind::Directional { irradiance, .. } => *irradiance *= by,
+            LampKind::Environment { radiance, .. } => *radiance *= by,
+        }
+    }
+    lit
 }

@@ -129,6 +129,8 @@ pub struct Relit {
     groups: Vec<Group>,
     unseen: Vec<String>,
     fit: Fit,
+    /// The scene evenly coloured, its lamps as bright as they were found.
+    burning: Scene,
     /// By pixel of the frame: ŷ over the reflectance that it was computed with, by channel, and the
     /// variance of its logarithm; NaN where light is unknown.
     expected: Vec<[f64; 6]>,
@@ -137,6 +139,15 @@ pub struct Relit {
     rounds: u32,
     reflected_share: f64,
     samples: u64,
+}
+
+impl Relit {
+    /// The scene as it was lit: evenly coloured as was found, every lamp as bright as it was, in
+    /// units of the photograph.
+    #[must_use]
+    pub fn scene(&self) -> &Scene {
+        &self.burning
+    }
 }
 
 /// Takes stock of the light on what a photograph shows: renders the scene with each lamp alone,
@@ -187,12 +198,14 @@ pub fn relight(
             let unknown = expected::unknown(&frame, &averaged, &expected);
             let noise = Noise::of(photograph);
             let samples = settings.samples;
+            let burning = lamps::burning(&even, &found(&sources, &groups, &fit));
             return Ok(Relit {
                 frame,
                 noise,
                 groups,
                 unseen,
                 fit,
+                burning,
                 expected,
                 unknown,
                 rounds: round,
@@ -204,6 +217,15 @@ pub fn relight(
             material.base_colour = (material.base_colour * by).min(Vec3::splat(0.98));
         }
     }
+}
+
+/// Each lamp that was seen and how brightly it burnt.
+fn found(sources: &[Source], groups: &[Group], fit: &Fit) -> Vec<(Source, Vec3)> {
+    let of = |(group, a): (&Group, &[f64; 3])| {
+        let by = Vec3::from(a.map(|a| a.max(0.0) as f32));
+        group.of.iter().map(|&l| (sources[l].clone(), by)).collect::<Vec<_>>()
+    };
+    groups.iter().zip(&fit.strength).flat_map(of).collect()
 }
 
 /// Lamps that pictures tell apart, and the names of those that do not reach what is seen.

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use crate::{
     Drilled, Scene, Slices,
-    structure::{Action, Date, Measures, Place, Test},
+    structure::{Action, Date, Measures, Photographed, Place, Test},
 };
 
 /// One thing that is known of a member.
@@ -47,6 +47,7 @@ pub fn listed(scene: &Scene) -> Vec<Listed> {
     let slices = scene.members.iter().flat_map(|m| m.slices.iter().map(|s| (m.id.as_str(), s)));
     let mut all: Vec<Listed> = observed
         .chain(slices.filter_map(|(member, slices)| of_slices(member, slices)))
+        .chain(scene.structure.photographs.iter().map(of_photograph))
         .chain(scene.structure.tests.iter().map(of_test))
         .chain(readings(scene))
         .chain(series(scene))
@@ -84,6 +85,21 @@ fn of_slices(member: &str, slices: &Slices) -> Option<Listed> {
         value,
         instrument: None,
     })
+}
+
+fn of_photograph(photo: &Photographed) -> Listed {
+    let file = photo.file.file_name().unwrap_or_default().to_string_lossy();
+    Listed {
+        member: photo.member.clone(),
+        name: photo.name.clone(),
+        kind: "photograph",
+        date: photo.date,
+        along: None,
+        angle_deg: None,
+        height_m: None,
+        value: file.into_owned(),
+        instrument: None,
+    }
 }
 
 fn of_test(test: &Test) -> Listed {

@@ -33,7 +33,7 @@ use crate::{
     AxisRuns, LoadError, Member, Scene,
     file::{
         Slices,
-        evidence::{self, EvidenceFile, MemberSlices, Record, Survey, no_member},
+        evidence::{self, EvidenceFile, MemberSlices, Photo, Record, Survey, no_member},
         extension, is_image, listing, matches, nearest, shorten,
     },
     load::PROJECT,
@@ -107,6 +107,7 @@ impl Attachment {
             What::LoadTest { .. } => &[],
             What::Table { file, .. } => std::slice::from_ref(file),
             What::Slices { files, .. } | What::Stack { files, .. } => files,
+            What::Photograph { files, .. } => files,
         }
     }
 
@@ -161,6 +162,13 @@ pub enum What {
         /// Where it was cut out.
         cut: Cut,
     },
+    /// A photograph that is read.
+    Photograph {
+        /// The photograph, and its table of picks.
+        files: [PathBuf; 2],
+        /// Focal length, pixels, where EXIF does not say it.
+        focal_px: Option<f64>,
+    },
     /// A weight of a load test; the test has as many as were attached under its name.
     LoadTest {
         /// Downwards, kN.
@@ -207,6 +215,7 @@ enum Entry {
     Item(Record),
     Table(Survey),
     Slices(MemberSlices),
+    Photo(Photo),
     Test(Test),
     /// One more weight of the test of this index.
     Weight(usize, Action),
@@ -218,6 +227,7 @@ impl Entry {
             Self::Item(_) => "items",
             Self::Table(_) => "tables",
             Self::Slices(_) => "slices",
+            Self::Photo(_) => "photographs",
             Self::Test(_) | Self::Weight(..) => "tests",
         }
     }
@@ -227,6 +237,7 @@ impl Entry {
             Self::Item(record) => ron_of(record),
             Self::Table(survey) => ron_of(survey),
             Self::Slices(slices) => ron_of(slices),
+            Self::Photo(photo) => ron_of(photo),
             Self::Test(test) => ron_of(test),
             Self::Weight(_, action) => ron_of(action),
         };
@@ -238,6 +249,7 @@ impl Entry {
             Self::Item(record) => file.items.push(record),
             Self::Table(survey) => file.tables.push(survey),
             Self::Slices(slices) => file.slices.push(slices),
+            Self::Photo(photo) => file.photographs.push(photo),
             Self::Test(test) => file.tests.push(test),
             Self::Weight(index, action) => {
                 file.tests.get_mut(index).into_iter().for_each(|t| t.actions.push(action.clone()));
@@ -473,6 +485,16 @@ impl Project {
                 };
                 Entry::Slices(MemberSlices { member: what.member.clone(), slices: vec![slices] })
             }
+            What::Photograph { files: [file, picks], focal_px } => Entry::Photo(Photo {
+                file: format!("{at}/{}", plain_name(file)?),
+                picks: format!("{at}/{}", plain_name(picks)?),
+                member: what.member.clone(),
+                name: name.to_owned(),
+                date: what.date,
+                focal_px: *focal_px,
+                picking_px: None,
+                shadow_error_mm: None,
+            }),
             What::LoadTest { force_kn } => {
                 let action = load_test::weight(&scene.members[member], *force_kn, what.along)
                     .map_err(AttachError::BadInput)?;
@@ -546,8 +568,10 @@ impl Project {
     /// Whether something attached to a member has this name.
     fn is_taken(&self, scene: &Scene, member: &str, name: &str) -> bool {
         let observed = &scene.structure.observations;
+        let photographs = &scene.structure.photographs;
         let slices = scene.members.iter().filter(|m| m.id == member).flat_map(|m| &m.slices);
         observed.iter().any(|o| o.member == member && o.name == name)
+            || photographs.iter().any(|p| p.member == member && p.name == name)
             || slices.map(crate::Slices::name).any(|n| n == name)
             || self.file.tables.iter().any(|t| t.member == member && t.name == name)
             || self.test_of(member, name).is_some()
@@ -558,6 +582,7 @@ impl Project {
         let numbered: Box<dyn Fn(u32) -> String> = match &what.what {
             What::Finding(finding) => Box::new(|n| format!("{} {n}", finding.kind())),
             What::Slices { .. } | What::Stack { .. } => Box::new(|n| format!("core {n}")),
+            What::Photograph { .. } => Box::new(|n| format!("photograph {n}")),
             What::LoadTest { .. } => Box::new(|n| format!("load test {n}")),
             // Rows are called after their table, with a number behind it.
             What::Table { file, .. } => {
@@ -580,6 +605,7 @@ impl Project {
             "items" => _ = right.items.remove(index),
             "tables" => _ = right.tables.remove(index),
             "tests" => _ = right.tests.remove(index),
+            "photographs" => _ = right.photographs.remove(index),
             _ => _ = right.slices.remove(index),
         }
         let text = self.text.as_deref().unwrap_or_default();
@@ -640,6 +666,10 @@ impl Project {
         if let Some(i) = self.test_of(member, name) {
             return Ok(("tests", i, Vec::new()));
         }
+        if let Some(i) = file.photographs.iter().position(|p| is(&p.member, &p.name)) {
+            let Photo { file, picks, .. } = &file.photographs[i];
+            return Ok(("photographs", i, vec![file.clone(), picks.clone()]));
+        }
         let alone = |s: &MemberSlices| s.slices.len() == 1 && is(&s.member, s.slices[0].name());
         if let Some(i) = file.slices.iter().position(alone) {
             return Ok(("slices", i, images(&file.slices[i]).cloned().collect()));
@@ -673,8 +703,12 @@ impl Project {
         let items = file.items.iter().map(|r| (&r.member, r.name.as_str()));
         let tables = file.tables.iter().map(|t| (&t.member, t.name.as_str()));
         let tests = file.tests.iter().map(|t| (&t.member, t.name.as_str()));
-        let all =
-            items.chain(tables).chain(tests).chain(slices.map(|(s, one)| (&s.member, one.name())));
+        let photographs = file.photographs.iter().map(|p| (&p.member, p.name.as_str()));
+        let all = items
+            .chain(tables)
+            .chain(tests)
+            .chain(photographs)
+            .chain(slices.map(|(s, one)| (&s.member, one.name())));
         let names: Vec<&str> = all.filter(|(m, _)| *m == member).map(|(_, n)| n).collect();
         let hint = match nearest(name, &names) {
             Some(meant) => format!("did you mean \"{}\"?", shorten(meant)),
@@ -690,7 +724,8 @@ impl Project {
         let named = |text: &str| {
             let tables = left.tables.iter().map(|t| &t.file);
             let pictures = left.items.iter().filter_map(|r| r.picture.as_ref());
-            let others = pictures.chain(left.slices.iter().flat_map(images));
+            let photographs = left.photographs.iter().flat_map(|p| [&p.file, &p.picks]);
+            let others = pictures.chain(photographs).chain(left.slices.iter().flat_map(images));
             tables.chain(others).any(|f| copy_of(f) == copy_of(text))
         };
         let mut copies = Vec::new();

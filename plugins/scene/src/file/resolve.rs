@@ -107,6 +107,7 @@ fn said(file: &SceneFile) -> Structure {
         gauges: file.gauges.clone(),
         readings: file.readings.clone(),
         observations: Vec::new(),
+        photographs: Vec::new(),
         scanners: file.scanners.clone(),
         climate: file.climate.clone(),
         profile: file.grading.as_ref().map(|g| g.profile.clone()),

@@ -10,6 +10,7 @@ mod gauge;
 mod georeference;
 mod grade;
 mod observation;
+mod photograph;
 mod project;
 mod scanner;
 
@@ -23,6 +24,7 @@ pub use gauge::*;
 pub use georeference::{Georeference, MapOrigin};
 pub use grade::{Grade, StrandGrade};
 pub use observation::*;
+pub use photograph::Photographed;
 pub use project::Project;
 pub use scanner::*;
 
@@ -58,6 +60,8 @@ pub struct Structure {
     pub series: Vec<Series>,
     /// What was measured or seen on members, in the order of the files and of their entries.
     pub observations: Vec<Observation>,
+    /// Photographs that are read, in the order of the files.
+    pub photographs: Vec<Photographed>,
     /// X-ray scanners.
     pub scanners: Vec<Scanner>,
     /// Air about the members.

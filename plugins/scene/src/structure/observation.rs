@@ -156,7 +156,12 @@ pub enum Shows {
         area_m2: f64,
     },
     /// It was looked at there, and nothing was found.
-    Intact,
+    Intact {
+        /// Share of the surface there that was looked at, 0 to 1.
+        seen: f64,
+        /// Half of all cracks of this width would have been found, mm.
+        limit_mm: f64,
+    },
 }
 
 /// Reference electrodes of half-cell potentials.
@@ -273,6 +278,9 @@ pub mod usual {
         f64::max(1.0, 0.1 * mm)
     }
 
+    /// Half of all cracks of this width an eye finds, mm (ours).
+    pub const FOUND_MM: f64 = 0.15;
+
     /// Width of a crack, mm: .05, the step of a crack card, or 10 %, whichever is more, since it
     /// changes along the crack (ours).
     #[must_use]
@@ -299,7 +307,7 @@ impl Shows {
             Self::Rust { .. } => "rust",
             Self::Efflorescence { .. } => "efflorescence",
             Self::WetSpot { .. } => "wet spot",
-            Self::Intact => "intact",
+            Self::Intact { .. } => "intact",
         }
     }
 }
@@ -343,7 +351,7 @@ impl fmt::Display for Shows {
             Self::Rust { area_m2 }
             | Self::Efflorescence { area_m2 }
             | Self::WetSpot { area_m2 } => write!(f, "{area_m2} m²"),
-            Self::Intact => f.write_str("nothing found"),
+            Self::Intact { .. } => f.write_str("nothing found"),
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::{
     super::check::Checker,
-    Along, EvidenceFile, Finding, MemberSlices, Record, Survey,
+    Along, EvidenceFile, Finding, MemberSlices, Photo, Record, Survey,
     table::{self, Seat},
 };
 use crate::{
@@ -24,6 +24,7 @@ pub fn check(file: &EvidenceFile) -> Vec<Problem> {
         ("items", file.items.len()),
         ("tables", file.tables.len()),
         ("slices", file.slices.len()),
+        ("photographs", file.photographs.len()),
         ("tests", file.tests.len()),
         ("gauges", file.gauges.len()),
         ("readings", file.readings.len()),
@@ -38,6 +39,7 @@ pub fn check(file: &EvidenceFile) -> Vec<Problem> {
     c.each("items", &file.items, Checker::record);
     c.each("tables", &file.tables, Checker::survey);
     c.each("slices", &file.slices, Checker::member_slices);
+    c.each("photographs", &file.photographs, Checker::photograph);
     c.each("tests", &file.tests, Checker::test);
     c.each("gauges", &file.gauges, Checker::gauge);
     c.each("readings", &file.readings, Checker::reading);
@@ -71,6 +73,25 @@ impl Checker<'_> {
         self.date(r.date);
         self.spot(r.along, r.face.is_some(), r.angle_deg, r.height_m);
         self.at("shows", |c| c.finding(&r.shows));
+    }
+
+    fn photograph(&mut self, photo: &Photo) {
+        let Photo { file, picks, member, name, date, focal_px, picking_px, shadow_error_mm } =
+            photo;
+        for (field, text) in [("file", file), ("picks", picks), ("member", member), ("name", name)]
+        {
+            self.text(field, text);
+        }
+        self.date(*date);
+        for (field, value, low, high) in [
+            ("focal_px", focal_px, 10.0, 1e6),
+            ("picking_px", picking_px, 0.01, 100.0),
+            ("shadow_error_mm", shadow_error_mm, 0.0, 1000.0),
+        ] {
+            if let Some(value) = value {
+                self.within(field, *value as f32, low, high);
+            }
+        }
     }
 
     fn date(&mut self, date: Option<Date>) {

@@ -62,6 +62,9 @@ pub struct EvidenceFile {
     /// CT slices of members.
     #[serde(default)]
     pub slices: Vec<MemberSlices>,
+    /// Photographs that are read: what they show of their members is evidence.
+    #[serde(default)]
+    pub photographs: Vec<Photo>,
     /// Load tests, as those of the scene.
     #[serde(default)]
     pub tests: Vec<Test>,
@@ -320,6 +323,33 @@ pub enum Kind {
     Carbonation,
 }
 
+/// A photograph of a member, whose light is taken off and whose damage is read.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Photo {
+    /// Path, relative to this file: JPEG, PNG or TIFF.
+    pub file: String,
+    /// Table of picks (CSV), relative to this file: `u`, `v` in pixels of the upright photograph
+    /// and `x`, `y`, `z` in m, or `member`, `corner`.
+    pub picks: String,
+    /// Id of the member.
+    pub member: String,
+    /// Name, unique within the member.
+    pub name: String,
+    /// When, as `"2026-05-03"`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub date: Option<Date>,
+    /// Focal length in pixels; what EXIF says where it is left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub focal_px: Option<f64>,
+    /// Standard error of a pick; 2 where it is left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub picking_px: Option<f64>,
+    /// Standard error of where shadows lie on the faces; 20 where it is left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shadow_error_mm: Option<f64>,
+}
+
 /// CT slices of a member.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -365,7 +395,7 @@ pub(crate) struct Evidence {
     pub(crate) records: Vec<Placed<Record>>,
     /// Rows of its tables of gauges.
     pub(crate) readings: Vec<Placed<RawReading>>,
-    /// Photographs that it names, and where they are.
+    /// Photographs and their picks that it names, and where they are.
     pub(crate) pictures: HashMap<String, PathBuf>,
 }
 
@@ -407,7 +437,8 @@ pub(crate) fn gather(
     for text in &scene.evidence {
         paths.push(sources.path(text)?);
     }
-    paths.extend(sources.evidence().filter(|path| !paths.contains(path)));
+    let beside: Vec<PathBuf> = sources.evidence().filter(|path| !paths.contains(path)).collect();
+    paths.extend(beside);
     let mut all = Vec::new();
     for path in paths {
         job.step(0, 0)?;
@@ -437,9 +468,16 @@ pub(crate) fn gather(
 impl Evidence {
     /// Finds the photographs that it names, which go into the hash.
     fn find_pictures(&mut self, sources: &mut Sources, job: &Job) -> Result<(), LoadError> {
-        for (i, record) in self.file.items.iter().enumerate() {
-            let Some(text) = &record.picture else { continue };
-            let place = format!("{}: items[{i}].picture", self.name);
+        let items = self.file.items.iter().enumerate();
+        let pictures = items.filter_map(|(i, record)| {
+            Some((format!("items[{i}].picture"), record.picture.as_ref()?))
+        });
+        let photographs = self.file.photographs.iter().enumerate().flat_map(|(i, photo)| {
+            let at = |field: &str| format!("photographs[{i}].{field}");
+            [(at("file"), &photo.file), (at("picks"), &photo.picks)]
+        });
+        for (field, text) in pictures.chain(photographs) {
+            let place = format!("{}: {field}", self.name);
             let path = sources.path_from(&self.folder, text).map_err(|e| e.under(&place))?;
             sources.hash_file(&path, job).map_err(|e| e.under(&place))?;
             self.pictures.insert(text.clone(), path);
@@ -508,6 +546,7 @@ mod tests {
         let file = parse("e.ron", &examples()).unwrap();
         assert_eq!(check(&file), []);
         assert_eq!([file.items.len(), file.tables.len(), file.slices.len()], [5, 3, 2]);
+        assert_eq!(file.photographs.len(), 1);
         assert_eq!([file.tests.len(), file.gauges.len(), file.readings.len()], [1, 1, 1]);
     }
 }

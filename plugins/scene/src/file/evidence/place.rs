@@ -6,13 +6,16 @@ use std::{
 };
 
 use super::{
-    Along, Evidence, Face, Finding, Placed, RawReading, Record, face::UPRIGHT, table::Seat,
+    Along, Evidence, Face, Finding, Photo, Placed, RawReading, Record, face::UPRIGHT, table::Seat,
 };
 use crate::{
     Member, Scene,
     file::{nearest, shorten},
     problem::Problem,
-    structure::{Gauge, Measures, Observation, Reading, Sample, Series, Shows, Spot, usual},
+    structure::{
+        Gauge, Measures, Observation, Photographed, Reading, Sample, Series, Shows, Spot,
+        Structure, usual,
+    },
 };
 
 /// How many problems are listed before the list is cut.
@@ -35,8 +38,13 @@ pub(crate) fn place(scene: &mut Scene, evidence: &Evidence) -> Result<(), Vec<Pr
     evidence.readings.iter().for_each(|reading| found.seat(reading));
     found.lists(evidence);
     evidence.records.iter().for_each(|record| found.record(record));
+    for (i, photo) in evidence.file.photographs.iter().enumerate() {
+        found.photograph(&format!("{}: photographs[{i}]", evidence.name), photo);
+    }
     evidence.readings.iter().for_each(|reading| found.reading(reading));
-    let Placing { problems, observations, gauges, readings, mut series, warnings, .. } = found;
+    let Placing {
+        problems, observations, photographs, gauges, readings, mut series, warnings, ..
+    } = found;
     if !problems.is_empty() {
         return Err(problems);
     }
@@ -50,6 +58,7 @@ pub(crate) fn place(scene: &mut Scene, evidence: &Evidence) -> Result<(), Vec<Pr
     series.iter_mut().for_each(|s| s.samples.sort_by_key(|sample| sample.date));
     structure.series.extend(series);
     structure.observations.extend(observations);
+    structure.photographs.extend(photographs);
     Ok(())
 }
 
@@ -69,6 +78,7 @@ struct Placing<'a> {
     own: &'a Evidence,
     problems: Vec<Problem>,
     observations: Vec<Observation>,
+    photographs: Vec<Photographed>,
     /// Gauges that tables define.
     gauges: Vec<Gauge>,
     readings: Vec<Reading>,
@@ -80,17 +90,19 @@ impl<'a> Placing<'a> {
     fn new(scene: &'a Scene, own: &'a Evidence) -> Self {
         let of_slices =
             |m: &'a Member| m.slices.iter().map(|s| (m.id.clone(), s.name().to_owned()));
-        let observations = &scene.structure.observations;
+        let Structure { observations, photographs, .. } = &*scene.structure;
         let names = scene.members.iter().flat_map(of_slices);
         Self {
             scene,
             index_of: scene.members.iter().enumerate().map(|(i, m)| (m.id.as_str(), i)).collect(),
             names: names
                 .chain(observations.iter().map(|o| (o.member.clone(), o.name.clone())))
+                .chain(photographs.iter().map(|p| (p.member.clone(), p.name.clone())))
                 .collect(),
             own,
             problems: Vec::new(),
             observations: Vec::new(),
+            photographs: Vec::new(),
             gauges: Vec::new(),
             readings: Vec::new(),
             series: Vec::new(),
@@ -151,6 +163,24 @@ impl<'a> Placing<'a> {
                 }
             }
         }
+    }
+
+    fn photograph(&mut self, place: &str, photo: &Photo) {
+        if self.member(&format!("{place}.member"), &photo.member).is_none() {
+            return;
+        }
+        self.name(format!("{place}.name"), &photo.member, &photo.name);
+        let path = |text: &String| self.own.pictures.get(text).cloned().unwrap_or_default();
+        self.photographs.push(Photographed {
+            member: photo.member.clone(),
+            name: photo.name.clone(),
+            file: path(&photo.file),
+            picks: path(&photo.picks),
+            date: photo.date,
+            focal_px: photo.focal_px,
+            picking_px: photo.picking_px.unwrap_or(Photographed::PICKING_PX),
+            shadow_error_m: 1e-3 * photo.shadow_error_mm.unwrap_or(Photographed::SHADOW_ERROR_MM),
+        });
     }
 
     fn taken(&mut self, place: String, name: &str, what: &str) {
@@ -433,7 +463,7 @@ impl<'a> Placing<'a> {
             Finding::Rust { area_m2 } => Shows::Rust { area_m2 },
             Finding::Efflorescence { area_m2 } => Shows::Efflorescence { area_m2 },
             Finding::WetSpot { area_m2 } => Shows::WetSpot { area_m2 },
-            Finding::Intact => Shows::Intact,
+            Finding::Intact => Shows::Intact { seen: 1.0, limit_mm: usual::FOUND_MM },
         }
     }
 
