@@ -53,6 +53,37 @@ impl Finish {
     }
 }
 
+impl Finish {
+    /// The same with lines that are no cracks, as whoever looks for cracks must learn to leave
+    /// alone: narrow seams, pencil and chalk, scratches, thin runs, specks, rims of covers.
+    #[must_use]
+    pub fn lined(mut self) -> Self {
+        let mut draw = Dice(Draw::new(self.key.split(3, 0)));
+        if draw.chance(0.25) {
+            self.reliefs.push(seams(&mut draw));
+        }
+        if draw.chance(0.35) {
+            self.reliefs.push(coarse(&mut draw));
+        }
+        if draw.chance(0.08) {
+            self.reliefs.push(covers(&mut draw));
+        }
+        if draw.chance(0.3) {
+            self.marks.push(specks(&mut draw));
+        }
+        if draw.chance(0.25) {
+            self.marks.push(thin_runs(&mut draw));
+        }
+        if draw.chance(0.3) {
+            self.marks.push(long_lines(&mut draw));
+        }
+        if draw.chance(0.15) {
+            self.marks.push(scratches(&mut draw));
+        }
+        self
+    }
+}
+
 /// Draws in single precision.
 struct Dice(Draw);
 
@@ -402,6 +433,84 @@ fn scratches(draw: &mut Dice) -> Mark {
         share: draw.between(0.1, 0.5),
         colour: Vec3::splat(if draw.chance(0.7) { 0.65 } else { 0.08 }),
         strength: draw.between(0.3, 0.9),
+        straight: true,
+    })
+}
+
+/// Grains that stand out, from sand to rendered pebbles.
+fn coarse(draw: &mut Dice) -> Relief {
+    let size = draw.log(5e-3, 50e-3);
+    Relief::Rough(Rough {
+        size: Vec2::splat(size),
+        octaves: 5,
+        gain: draw.between(0.55, 0.8),
+        amplitude: size * draw.log(0.01, 0.08),
+        dark: draw.between(0.0, 0.3),
+    })
+}
+
+/// Seams of narrow boards or strips, dark and hardly ever broken.
+fn seams(draw: &mut Dice) -> Relief {
+    let (near, far) = (draw.log(0.06, 0.4), draw.between(1.0, 4.0));
+    Relief::Joints(Joints {
+        panel: if draw.chance(0.7) { vec2(near, far) } else { vec2(far, near) },
+        width: draw.log(0.6e-3, 5e-3),
+        depth: draw.between(-1e-3, 2e-3),
+        tone: draw.between(0.0, 0.2),
+        dark: draw.between(0.3, 0.97),
+    })
+}
+
+/// Round covers and plugs with a dark rim.
+fn covers(draw: &mut Dice) -> Relief {
+    let radius = draw.log(12e-3, 70e-3);
+    let spacing = radius * draw.between(4.0, 12.0);
+    Relief::Holes(Holes {
+        spacing: vec2(spacing, spacing * draw.between(0.7, 1.5)),
+        radius,
+        depth: draw.log(0.5e-3, 6e-3),
+        tone: draw.between(0.75, 1.2),
+    })
+}
+
+/// Small sharp spots of dirt, drawn out along the face.
+fn specks(draw: &mut Dice) -> Mark {
+    Mark::Patches(Patches {
+        cover: Cover {
+            matter: Matter::Dirt,
+            colour: Vec3::new(0.6, 0.58, 0.55) * draw.log(0.3, 1.2),
+            replaces: false,
+            strength: draw.between(0.5, 1.0),
+        },
+        size: draw.log(5e-3, 40e-3),
+        tall: draw.log(0.5, 4.0),
+        from: draw.between(0.2, 0.5),
+        border: draw.log(0.02, 0.15),
+    })
+}
+
+/// What a single drop left on its way down.
+fn thin_runs(draw: &mut Dice) -> Mark {
+    let dark = draw.chance(0.7);
+    let cover = Cover {
+        matter: Matter::Dirt,
+        colour: Vec3::new(1.0, 0.97, 0.93) * if dark { draw.log(0.2, 0.75) } else { 1.4 },
+        replaces: false,
+        strength: draw.between(0.4, 1.0),
+    };
+    let width = draw.log(1.5e-3, 10e-3);
+    runs(draw, cover, 12.0 * width, width, 0.6, 0.4)
+}
+
+/// Pencil, chalk, the edge of a trowel: long, straight or slightly bowed.
+fn long_lines(draw: &mut Dice) -> Mark {
+    let width = draw.log(0.5e-3, 4e-3);
+    Mark::Strokes(Strokes {
+        size: draw.log(0.1, 0.6),
+        width,
+        share: draw.between(0.3, 0.9),
+        colour: Vec3::splat(if draw.chance(0.7) { draw.log(0.03, 0.2) } else { 0.7 }),
+        strength: draw.between(0.3, 0.95),
         straight: true,
     })
 }
