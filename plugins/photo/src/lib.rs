@@ -4,6 +4,7 @@ pub mod closeup;
 pub mod corner;
 pub mod face;
 pub mod map;
+pub mod marks;
 pub mod overlay;
 pub mod picks;
 pub mod picture;

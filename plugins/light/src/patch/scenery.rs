@@ -194,12 +194,14 @@ impl Builder {
         let mut cracks = Vec::new();
         for n in 0..number {
             let widest = if self.draw.chance(0.15) { 14.0 } else { 4.0 };
-            let pixels = self.log(0.25, widest);
+            let pixels = self.log(0.35, widest);
+            let (way, length) = (self.between(0.0, 2.0 * PI), self.log(0.4, 2.5) * self.side);
             let seed = Seed {
                 step: (2.0 * pixel).min(4e-3),
-                at: self.somewhere(1.3),
-                way: self.between(0.0, 2.0 * PI),
-                length: self.log(0.3, 2.5) * self.side,
+                // Most of it passes through the picture, wherever it begins.
+                at: self.somewhere(0.8) - 0.5 * length * Vec2::from_angle(way),
+                way,
+                length,
                 width: (pixels * pixel).clamp(5e-5, 15e-3),
                 unrest: self.log(0.5, 2.5) / self.side.sqrt(),
                 forks: if self.draw.chance(0.4) { self.log(0.5, 4.0) / self.side } else { 0.0 },

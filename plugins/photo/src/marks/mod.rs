@@ -1,0 +1,3 @@
+//! Damage that is seen in a photograph.
+
+pub mod lesson;
