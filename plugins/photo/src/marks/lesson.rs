@@ -48,14 +48,10 @@ impl Lesson {
     /// The job was cancelled.
     pub fn render(seed: u64, number: u64, job: &Job) -> Result<Self, Cancelled> {
         let patch = Patch::render(Key::new(seed, number), SIDE as u32, SAMPLES, job)?;
-        let mouth = |p: &CoursePoint| Mouth {
-            at: p.at,
-            width: p.width / patch.pixel,
-            visible: p.visible,
-        };
-        let label = |l: &intrados_light::patch::Label| {
-            [l.crack, l.spall, l.steel, l.rust, l.efflorescence]
-        };
+        let mouth =
+            |p: &CoursePoint| Mouth { at: p.at, width: p.width / patch.pixel, visible: p.visible };
+        let label =
+            |l: &intrados_light::patch::Label| [l.crack, l.spall, l.steel, l.rust, l.efflorescence];
         Ok(Self {
             side: SIDE,
             courses: patch.courses.iter().map(|c| c.iter().map(mouth).collect()).collect(),
