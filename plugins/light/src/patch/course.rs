@@ -20,6 +20,8 @@ pub(super) struct Seed {
     pub(super) length: f32,
     /// m.
     pub(super) width: f32,
+    /// Depth over width; none is shallower than 2 mm.
+    pub(super) depth: f32,
     /// How much it wanders: rad per √m.
     pub(super) unrest: f32,
     /// Forks per metre.
@@ -72,7 +74,7 @@ pub(super) fn grow(seed: Seed, key: Key) -> Vec<CrackSurface> {
             at += step * Vec2::new(now.cos(), now.sin());
         }
         let across = Vec2::new(-seed.way.sin(), seed.way.cos());
-        let depth = (20.0 * seed.width).clamp(6e-3, 0.08);
+        let depth = (seed.depth * seed.width).clamp(2e-3, 0.08);
         all.push(CrackSurface { mouth, normal: across.extend(0.0), depth });
     }
     all

@@ -121,7 +121,7 @@ impl Builder {
         let worn = self.between(0.0, 1.0);
         let (rust, salt) = (self.draw.chance(0.2), self.draw.chance(0.2));
         let mut finish = Finish::new(kind, self.key.split(1, 0), worn).stained(rust, salt);
-        if self.draw.chance(0.7) {
+        if self.draw.chance(0.8) {
             finish = finish.lined();
         }
         let material = Material {
@@ -193,8 +193,8 @@ impl Builder {
         let number = [0, 0, 1, 1, 1, 1, 2, 2, 2, 3][self.draw.count(0, 9)];
         let mut cracks = Vec::new();
         for n in 0..number {
-            let widest = if self.draw.chance(0.15) { 14.0 } else { 4.0 };
-            let pixels = self.log(0.35, widest);
+            let wide = self.draw.chance(0.3);
+            let pixels = if wide { self.log(2.5, 16.0) } else { self.log(0.35, 4.0) };
             let (way, length) = (self.between(0.0, 2.0 * PI), self.log(0.4, 2.5) * self.side);
             let seed = Seed {
                 step: (2.0 * pixel).min(4e-3),
@@ -202,7 +202,8 @@ impl Builder {
                 at: self.somewhere(0.8) - 0.5 * length * Vec2::from_angle(way),
                 way,
                 length,
-                width: (pixels * pixel).clamp(5e-5, 15e-3),
+                width: (pixels * pixel).clamp(5e-5, 20e-3),
+                depth: self.log(2.0, 30.0),
                 unrest: self.log(0.5, 2.5) / self.side.sqrt(),
                 forks: if self.draw.chance(0.4) { self.log(0.5, 4.0) / self.side } else { 0.0 },
                 free: self.draw.chance(0.6),

@@ -23,6 +23,15 @@ pub(super) fn taken(light: &Grid<Vec3>, key: Key) -> Grid<Vec3> {
         let strength = draw.log_between(0.01, 0.12) as f32;
         texture(&mut roots, key.split(1, 0), draw.log_between(0.5, 3.0), strength);
     }
+    if draw.chance(0.5) {
+        let rarity = draw.between(1.2, 3.0) as f32;
+        specks(
+            &mut roots,
+            key.split(4, 0),
+            draw.log_between(0.7, 3.0),
+            [rarity, draw.unit() as f32],
+        );
+    }
     if draw.chance(0.25) {
         let soft = blurred(&roots, draw.between(0.7, 1.5));
         let more = draw.between(0.3, 1.2) as f32;
@@ -93,6 +102,15 @@ fn texture(roots: &mut Grid<Vec3>, key: Key, size: f64, strength: f32) {
     let grains = grains(roots.width, roots.height, key, size);
     let values = roots.data.iter_mut().zip(&grains.data);
     values.for_each(|(root, g)| *root *= (1.0 + strength * g).max(0.1));
+}
+
+/// Dark spots and pits: where soft noise exceeds so many of its deviations.
+fn specks(roots: &mut Grid<Vec3>, key: Key, size: f64, [rarity, strength]: [f32; 2]) {
+    let grains = grains(roots.width, roots.height, key, size);
+    let values = roots.data.iter_mut().zip(&grains.data);
+    values.for_each(|(root, g)| {
+        *root *= 1.0 - 0.7 * strength * ((g - rarity) / 0.5).clamp(0.0, 1.0);
+    });
 }
 
 /// The sensor's noise, half of it alike in all colours.

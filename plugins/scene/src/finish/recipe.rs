@@ -59,17 +59,22 @@ impl Finish {
     #[must_use]
     pub fn lined(mut self) -> Self {
         let mut draw = Dice(Draw::new(self.key.split(3, 0)));
-        if draw.chance(0.25) {
+        if draw.chance(0.4) {
             self.reliefs.push(seams(&mut draw));
         }
-        if draw.chance(0.35) {
+        if draw.chance(0.4) {
             self.reliefs.push(coarse(&mut draw));
+        }
+        if draw.chance(0.4) {
+            self.reliefs.push(pinholes(&mut draw));
         }
         if draw.chance(0.08) {
             self.reliefs.push(covers(&mut draw));
         }
-        if draw.chance(0.3) {
-            self.marks.push(specks(&mut draw));
+        for share in [0.5, 0.3] {
+            if draw.chance(share) {
+                self.marks.push(specks(&mut draw));
+            }
         }
         if draw.chance(0.25) {
             self.marks.push(thin_runs(&mut draw));
@@ -437,6 +442,11 @@ fn scratches(draw: &mut Dice) -> Mark {
     })
 }
 
+/// Many small bug-holes.
+fn pinholes(draw: &mut Dice) -> Relief {
+    Relief::Pores(Pores { largest: draw.log(1e-3, 5e-3), share: draw.between(0.3, 0.95) })
+}
+
 /// Grains that stand out, from sand to rendered pebbles.
 fn coarse(draw: &mut Dice) -> Relief {
     let size = draw.log(5e-3, 50e-3);
@@ -445,7 +455,7 @@ fn coarse(draw: &mut Dice) -> Relief {
         octaves: 5,
         gain: draw.between(0.55, 0.8),
         amplitude: size * draw.log(0.01, 0.08),
-        dark: draw.between(0.0, 0.3),
+        dark: draw.between(0.0, 0.5),
     })
 }
 
@@ -453,8 +463,8 @@ fn coarse(draw: &mut Dice) -> Relief {
 fn seams(draw: &mut Dice) -> Relief {
     let (near, far) = (draw.log(0.06, 0.4), draw.between(1.0, 4.0));
     Relief::Joints(Joints {
-        panel: if draw.chance(0.7) { vec2(near, far) } else { vec2(far, near) },
-        width: draw.log(0.6e-3, 5e-3),
+        panel: if draw.chance(0.75) { vec2(near, far) } else { vec2(far, near) },
+        width: draw.log(0.4e-3, 4e-3),
         depth: draw.between(-1e-3, 2e-3),
         tone: draw.between(0.0, 0.2),
         dark: draw.between(0.3, 0.97),
@@ -482,9 +492,9 @@ fn specks(draw: &mut Dice) -> Mark {
             replaces: false,
             strength: draw.between(0.5, 1.0),
         },
-        size: draw.log(5e-3, 40e-3),
-        tall: draw.log(0.5, 4.0),
-        from: draw.between(0.2, 0.5),
+        size: draw.log(3e-3, 40e-3),
+        tall: draw.log(0.5, 5.0),
+        from: draw.between(0.1, 0.5),
         border: draw.log(0.02, 0.15),
     })
 }
