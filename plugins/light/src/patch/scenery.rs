@@ -37,7 +37,7 @@ pub(super) fn draw(key: Key, size: u32) -> Drawn {
     let pixel = side / size as f32;
     let mut builder = Builder { draw, key, side, scene: Scene::default() };
     let camera = builder.camera(size);
-    builder.face();
+    builder.face(pixel);
     let cracks = builder.cracks(pixel);
     let spalls = builder.spalls();
     builder.before();
@@ -103,7 +103,7 @@ impl Builder {
     }
 
     /// A piece of wall or paving, with what formwork, weather and people left on it.
-    fn face(&mut self) {
+    fn face(&mut self, pixel: f32) {
         let kinds = [
             FinishKind::Board,
             FinishKind::Board,
@@ -122,7 +122,7 @@ impl Builder {
         let (rust, salt) = (self.draw.chance(0.2), self.draw.chance(0.2));
         let mut finish = Finish::new(kind, self.key.split(1, 0), worn).stained(rust, salt);
         if self.draw.chance(0.8) {
-            finish = finish.lined();
+            finish = finish.lined(pixel);
         }
         let material = Material {
             name: "face".into(),

@@ -19,8 +19,11 @@ pub(super) fn taken(light: &Grid<Vec3>, key: Key) -> Grid<Vec3> {
     if draw.chance(0.45) {
         roots = blurred(&roots, draw.between(0.35, 1.3));
     }
-    if draw.chance(0.45) {
-        let strength = draw.log_between(0.01, 0.12) as f32;
+    if draw.chance(0.6) {
+        haze(&mut roots, draw.log_between(0.05, 2.0) as f32);
+    }
+    if draw.chance(0.6) {
+        let strength = draw.log_between(0.01, 0.3) as f32;
         texture(&mut roots, key.split(1, 0), draw.log_between(0.5, 3.0), strength);
     }
     if draw.chance(0.5) {
@@ -61,6 +64,12 @@ fn expose(roots: &mut Grid<Vec3>, draw: &mut Draw) {
         let factor = 1.0 + 0.5 * fall * (cos * x + sin * y) - 0.5 * corners * (x * x + y * y);
         *root = (root.map(|r| r.powf(power)) * factor).min(Vec3::splat(brightest));
     }
+}
+
+/// Stray light, dust in cracks: contrast falls while its scatter, which comes later, does not.
+fn haze(roots: &mut Grid<Vec3>, share: f32) {
+    let mean = roots.data.iter().sum::<Vec3>() / roots.data.len() as f32;
+    roots.data.iter_mut().for_each(|root| *root = (*root + share * mean) / (1.0 + share));
 }
 
 /// The light's colour, and that some cameras see none.

@@ -51,8 +51,9 @@ const MARKS: usize = 5;
 const LEVELS: [usize; 4] = [16, 32, 48, 64];
 /// Edge of what is looked at in one go, pixels.
 const TILE: usize = 1024;
-/// What is looked at around it: convolutions and pooling reach some 55 cells.
-const MARGIN: usize = 112;
+/// What is looked at around it, a multiple of what pools alike: convolutions and pooling reach 59
+/// cells.
+const MARGIN: usize = 128;
 
 /// The weights that the program carries, as little-endian floats.
 static CARRIED: &[u8] = include_bytes!("../../../../assets/network/photo.f32");
@@ -136,12 +137,22 @@ impl Reader {
     /// # Errors
     /// The job was cancelled.
     pub fn marks(&self, light: &Grid<Vec3>, known: &Mask, job: &Job) -> Result<Marks, Cancelled> {
+        self.marks_by(TILE, light, known, job)
+    }
+
+    fn marks_by(
+        &self,
+        tile: usize,
+        light: &Grid<Vec3>,
+        known: &Mask,
+        job: &Job,
+    ) -> Result<Marks, Cancelled> {
         let sight = Sight::new(light, known, job)?;
         let mut marks = none(light.width, light.height);
         let mut spare = Spare::default();
-        for y in (0..light.height).step_by(TILE) {
-            for x in (0..light.width).step_by(TILE) {
-                self.tile(&sight, [x, y], &mut marks, &mut spare, job)?;
+        for y in (0..light.height).step_by(tile) {
+            for x in (0..light.width).step_by(tile) {
+                self.tile(&sight, [x, y], tile, &mut marks, &mut spare, job)?;
             }
         }
         for grid in &mut marks.grids {
@@ -156,6 +167,7 @@ impl Reader {
         &self,
         sight: &Sight,
         from: [usize; 2],
+        tile: usize,
         marks: &mut Marks,
         spare: &mut Spare,
         job: &Job,
@@ -163,14 +175,14 @@ impl Reader {
         let size = sight.size();
         let first = from.map(|at| at.saturating_sub(MARGIN));
         let cells = [0, 1].map(|k| {
-            let last = (from[k] + TILE + MARGIN).min(size[k]);
+            let last = (from[k] + tile + MARGIN).min(size[k]);
             (last - first[k]).div_ceil(CELL).next_multiple_of(self.0.shape().divisor())
         });
         let out = self.0.look(sight.cells(first, cells), spare, job)?;
         for (mark, grid) in marks.grids.iter_mut().enumerate() {
-            for y in from[1]..(from[1] + TILE).min(size[1]) {
+            for y in from[1]..(from[1] + tile).min(size[1]) {
                 let row = &mut grid.data[y * size[0]..][..size[0]];
-                for (x, value) in row.iter_mut().enumerate().skip(from[0]).take(TILE) {
+                for (x, value) in row.iter_mut().enumerate().skip(from[0]).take(tile) {
                     let score = score(&out, mark, [x - first[0], y - first[1]]);
                     *value = 1.0 / (1.0 + (-score).exp());
                 }
@@ -185,3 +197,6 @@ impl Reader {
 fn score(out: &Planes, mark: usize, [x, y]: [usize; 2]) -> f32 {
     out.row(mark * PIXELS + y % CELL * CELL + x % CELL, y / CELL)[x / CELL]
 }
+
+#[cfg(test)]
+mod tests;
