@@ -81,6 +81,7 @@ pub(crate) fn rule(scene: &Scene, light: &Light) -> WalkRule {
         max_order: light.max_depth.unwrap_or(theirs.max_order),
         roulette_from: light.roulette_from.unwrap_or(theirs.roulette_from),
         roulette: light.roulette.map_or(theirs.roulette, Into::into),
+        ..theirs
     }
 }
 

@@ -52,6 +52,17 @@ pub struct WalkRule {
     pub roulette_from: u32,
     /// How it is played.
     pub roulette: Roulette,
+    /// So many walks in a row draw the same numbers; 1: each its own. With as many as a picture has
+    /// pixels, its noise is the same everywhere: a sky becomes a few lamps, and nothing is grainy.
+    /// No error bar holds then.
+    #[serde(default = "WalkRule::apart")]
+    pub alike: u64,
+}
+
+impl WalkRule {
+    const fn apart() -> u64 {
+        1
+    }
 }
 
 impl Default for WalkRule {
@@ -61,6 +72,7 @@ impl Default for WalkRule {
             max_order: u32::MAX,
             roulette_from: 5,
             roulette: Roulette::Event,
+            alike: Self::apart(),
         }
     }
 }
@@ -187,7 +199,7 @@ pub fn run_watched<P: TransportProblem, T: Tally<P::Value>, W: WalkObserver<P>>(
     tally: &mut T,
     observer: &mut W,
 ) -> u64 {
-    work.begin(problem, side, seed, walks);
+    work.begin(problem, side, seed, walks, rule.alike);
     observer.begin(work.walk.len());
     let to = &mut Scored { tally, observer };
     let mut events = 0;
@@ -248,13 +260,13 @@ fn share<R: Real>(mine: R, other: R) -> R {
 }
 
 impl<P: TransportProblem> Workspace<P> {
-    fn begin(&mut self, problem: &P, side: Side, seed: u64, walks: Range<u64>) {
+    fn begin(&mut self, problem: &P, side: Side, seed: u64, walks: Range<u64>, alike: u64) {
         let n = (walks.end - walks.start) as usize;
         // The two sides draw apart, or their difference would not be the sum of two independent
         // errors.
         let seed = seed.wrapping_mul(2) + u64::from(side == Side::Dual);
         self.keys.clear();
-        self.keys.extend(walks.clone().map(|walk| Key::new(seed, walk)));
+        self.keys.extend(walks.clone().map(|walk| Key::new(seed, walk / alike.max(1))));
         self.walk.clear();
         self.walk.extend(0..n as u32);
         self.weight.clear();

@@ -1,12 +1,9 @@
 //! A small U-Net that tells matrix, pore, crack and steel apart, pixel by pixel.
 //!
-//! Three levels of resolution, two convolutions of 3 × 3 taps and rectifiers a level, the largest
-//! of four on the way down, doubled pixels and the finer level's planes on the way up (Ronneberger
-//! et al. 2015). It sees two planes: how far grey lies from that of sound concrete, and where the
-//! body is. It was trained by [`train`] on the slices of [`simulate`], never on a real one;
-//! `assets/network` holds the weights and how they came to be.
+//! An [`Unet`] of three levels of resolution. It sees two planes: how far grey lies from that of
+//! sound concrete, and where the body is. It was trained by [`train`] on the slices of
+//! [`simulate`], never on a real one; `assets/network` holds the weights and how they came to be.
 
-mod planes;
 pub mod simulate;
 pub mod train;
 
@@ -15,8 +12,10 @@ use std::{ops::Range, sync::LazyLock};
 use intrados_stage::{Cancelled, Job};
 use serde::{Deserialize, Serialize};
 
-use intrados_raster::grid::{Grid, Mask};
-use planes::{BLOCK, Planes, Spare, TAPS};
+use intrados_raster::{
+    grid::{Grid, Mask},
+    network::{BLOCK, Planes, Shape, Spare, Unet},
+};
 
 /// What a pixel can be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -35,8 +34,6 @@ pub enum Class {
 pub const CLASSES: usize = 4;
 /// Planes that the network sees.
 const CT: usize = 2;
-/// Convolutions.
-const LAYERS: usize = 11;
 /// Sides must be divisible by this: two levels below the first.
 const DIVISOR: usize = 4;
 /// Edge of what is looked at in one go, pixels.
@@ -60,12 +57,7 @@ static BUILTIN: LazyLock<Option<Network>> = LazyLock::new(|| Network::from_bytes
 
 /// A trained network.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Network {
-    /// Planes of the first level; the second has twice, the third four times as many.
-    base: usize,
-    /// Weights `[output][input][tap]` and biases, layer by layer.
-    weights: Vec<f32>,
-}
+pub struct Network(Unet);
 
 /// How probable each class is, pixel by pixel.
 #[derive(Debug, Clone, PartialEq)]
@@ -82,32 +74,10 @@ impl Opinion {
     }
 }
 
-/// Everything that passed through the network, which training needs again.
-#[derive(Default)]
-struct Passage {
-    /// What entered each layer.
-    inputs: Vec<Planes>,
-    /// What left each layer.
-    outputs: Vec<Planes>,
-}
-
-/// Inputs and outputs of the layers of a network whose first level has `base` planes: down, bottom,
-/// up, head.
-const fn shapes(base: usize) -> [[usize; 2]; LAYERS] {
-    let [a, b, c] = [base, 2 * base, 4 * base];
-    [
-        [CT, a],
-        [a, a],
-        [a, b],
-        [b, b],
-        [b, c],
-        [c, c],
-        [c + b, b],
-        [b, b],
-        [b + a, a],
-        [a, a],
-        [a, CLASSES],
-    ]
+/// A network whose first level has `base` planes; the second has twice, the third four times as
+/// many.
+fn shape(base: usize) -> Shape {
+    Shape { inputs: CT, levels: vec![base, 2 * base, 4 * base], outputs: CLASSES }
 }
 
 impl Network {
@@ -127,39 +97,21 @@ impl Network {
     /// Reads little-endian floats; how many there are tells the size of the network.
     #[must_use]
     pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
-        let weights: Vec<f32> =
-            bytes.as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect();
         let base =
             (1..=16).map(|n| n * BLOCK).find(|&base| 4 * Self::count(base) == bytes.len())?;
-        weights.iter().all(|w| w.is_finite()).then_some(Self { base, weights })
+        Unet::from_bytes(shape(base), bytes).map(Self)
     }
 
     /// The weights as little-endian floats.
     #[must_use]
     pub fn to_bytes(&self) -> Vec<u8> {
-        self.weights.iter().flat_map(|w| w.to_le_bytes()).collect()
+        self.0.to_bytes()
     }
 
     /// Number of weights and biases.
     #[must_use]
-    pub const fn count(base: usize) -> usize {
-        let (mut sum, mut i) = (0, 0);
-        while i < LAYERS {
-            let [inputs, outputs] = shapes(base)[i];
-            sum += outputs * (inputs * TAPS + 1);
-            i += 1;
-        }
-        sum
-    }
-
-    /// Where the weights and the biases of `layer` are.
-    fn places(&self, layer: usize) -> [std::ops::Range<usize>; 2] {
-        let shapes = shapes(self.base);
-        let size = |[inputs, outputs]: [usize; 2]| outputs * (inputs * TAPS + 1);
-        let from: usize = shapes[..layer].iter().map(|&s| size(s)).sum();
-        let [inputs, outputs] = shapes[layer];
-        let middle = from + inputs * outputs * TAPS;
-        [from..middle, middle..middle + outputs]
+    pub fn count(base: usize) -> usize {
+        shape(base).count()
     }
 
     /// What the network thinks of a slice: `grey` relative to sound concrete, `seen` what lies
@@ -209,9 +161,7 @@ impl Network {
                 shown.row_mut(plane, row)[x] = v
             });
         }
-        let Some(out) = self.pass_while(shown, false, spare, job)?.outputs.pop() else {
-            return Ok(());
-        };
+        let out = self.0.look(shown, spare, job)?;
         for y in down {
             let rows: [&[f32]; CLASSES] = std::array::from_fn(|c| out.row(c, y - ys.start));
             for x in across.clone() {
@@ -221,102 +171,6 @@ impl Network {
         }
         spare.give(out);
         Ok(())
-    }
-
-    /// One passage that nobody waits for.
-    fn pass(&self, seen: Planes, keep: bool) -> Passage {
-        self.pass_while(seen, keep, &mut Spare::default(), &Job::default()).unwrap_or_default()
-    }
-
-    /// One passage; the memory of what is no longer needed is spared unless `keep`.
-    fn pass_while(
-        &self,
-        seen: Planes,
-        keep: bool,
-        spare: &mut Spare,
-        job: &Job,
-    ) -> Result<Passage, Cancelled> {
-        let mut passage = Passage { inputs: Vec::new(), outputs: Vec::new() };
-        let mut layer = 0;
-        let mut convolve = |input: Planes, spare: &mut Spare| {
-            if job.is_cancelled() {
-                return Err(Cancelled);
-            }
-            let [weights, biases] = self.places(layer).map(|range| &self.weights[range]);
-            layer += 1;
-            let output = input.convolved(weights, biases, layer < LAYERS, spare);
-            if keep {
-                passage.inputs.push(input);
-                passage.outputs.push(output.clone());
-            } else {
-                spare.give(input);
-            }
-            Ok(output)
-        };
-        let fine = convolve(seen, spare)?;
-        let fine = convolve(fine, spare)?;
-        let middle = convolve(fine.pooled(spare), spare)?;
-        let middle = convolve(middle, spare)?;
-        let coarse = convolve(middle.pooled(spare), spare)?;
-        let coarse = convolve(coarse, spare)?;
-        let up = coarse.doubled_with(&middle, spare);
-        [coarse, middle].into_iter().for_each(|done| spare.give(done));
-        let up = convolve(up, spare)?;
-        let half = convolve(up, spare)?;
-        let up = half.doubled_with(&fine, spare);
-        [half, fine].into_iter().for_each(|done| spare.give(done));
-        let up = convolve(up, spare)?;
-        let up = convolve(up, spare)?;
-        let out = convolve(up, spare)?;
-        if !keep {
-            passage.outputs.push(out);
-        }
-        Ok(passage)
-    }
-
-    /// The gradient of the weights, given that of the last layer's output.
-    fn learn(&self, passage: &Passage, gradient: Planes) -> Vec<f32> {
-        let mut learnt = vec![0.0; self.weights.len()];
-        let mut back = |layer: usize, gradient: Planes| {
-            let [weights, biases] = self.places(layer);
-            let gradient = if layer + 1 < LAYERS {
-                gradient.where_positive(&passage.outputs[layer])
-            } else {
-                gradient
-            };
-            let (teach, rest) = learnt[weights.start..].split_at_mut(weights.len());
-            passage.inputs[layer].teach(&gradient, teach, &mut rest[..biases.len()]);
-            let [inputs, outputs] = shapes(self.base)[layer];
-            match layer {
-                // Nobody asks what the picture should have been.
-                0 => gradient,
-                _ => gradient.convolved(
-                    &planes::adjoint(&self.weights[weights], inputs, outputs),
-                    &vec![0.0; inputs],
-                    false,
-                    &mut Spare::default(),
-                ),
-            }
-        };
-        let [fine, middle, coarse] =
-            [&passage.outputs[1], &passage.outputs[3], &passage.outputs[5]].map(Planes::planes);
-        let gradient = back(10, gradient);
-        let gradient = back(9, gradient);
-        let (gradient, to_fine) = back(8, gradient).parted(2 * fine);
-        let gradient = back(7, gradient.halved());
-        let (gradient, to_middle) = back(6, gradient).parted(coarse);
-        debug_assert_eq!(middle, 2 * fine, "a level has twice the planes of the one above");
-        let gradient = back(5, gradient.halved());
-        let gradient = back(4, gradient);
-        let mut gradient = passage.outputs[3].unpooled(&gradient);
-        gradient.add(&to_middle);
-        let gradient = back(3, gradient);
-        let gradient = back(2, gradient);
-        let mut gradient = passage.outputs[1].unpooled(&gradient);
-        gradient.add(&to_fine);
-        let gradient = back(1, gradient);
-        back(0, gradient);
-        learnt
     }
 }
 

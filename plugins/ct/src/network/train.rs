@@ -1,16 +1,18 @@
-//! Training: cross entropy and soft Dice on crops of simulated slices, AdamW (Loshchilov and Hutter
-//! 2019).
+//! Training: cross entropy and soft Dice on crops of simulated slices.
 
 use intrados_stage::{Job, random::Key};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    CLASSES, CT, Class, LAYERS, Network, Planes, TAPS, shapes, show,
+    CLASSES, CT, Class, Network, Planes, Unet, shape, show,
     simulate::{Noise, Plan, SIDE, Section, SimulateError, sections},
     softmax,
 };
-use intrados_raster::grid::Grid;
+use intrados_raster::{
+    grid::Grid,
+    network::{Optimiser, Schedule, mean},
+};
 
 /// How the network came to be: recorded beside the weights, and all that is needed to make them
 /// again.
@@ -146,7 +148,7 @@ impl TrainingSample {
     /// The loss of `out` and its gradient: 2 × mean cross entropy over the body, and 1 − (2 Σpt +
     /// 1)/(Σp + Σt + 1) of the pores.
     fn loss(&self, out: &Planes) -> (f32, Planes) {
-        let (w, h) = (out.width, out.height);
+        let (w, h) = (out.width(), out.height());
         let body = self.counts.iter().filter(|&&c| c).count().max(1) as f32;
         let pixel = |i: usize| softmax(std::array::from_fn(|c| out.row(c, i / w)[i % w]));
         let pore = Class::Pore as usize;
@@ -171,44 +173,7 @@ impl TrainingSample {
     }
 }
 
-/// AdamW with clipped gradients.
-struct Optimiser {
-    means: Vec<f32>,
-    squares: Vec<f32>,
-}
-
-impl Optimiser {
-    fn step(&mut self, weights: &mut [f32], gradient: &[f32], rate: f32, decay: f32, step: usize) {
-        const BETA: [f32; 2] = [0.9, 0.999];
-        let length = gradient.iter().map(|g| f64::from(*g).powi(2)).sum::<f64>().sqrt() as f32;
-        let clip = 1.0 / length.max(1.0);
-        let [a, b] = BETA.map(|b| 1.0 - b.powi(step as i32 + 1));
-        for (((w, g), m), s) in
-            weights.iter_mut().zip(gradient).zip(&mut self.means).zip(&mut self.squares)
-        {
-            let g = g * clip;
-            *m = BETA[0] * *m + (1.0 - BETA[0]) * g;
-            *s = BETA[1] * *s + (1.0 - BETA[1]) * g * g;
-            *w -= rate * (*m / a / ((*s / b).sqrt() + 1e-8) + decay * *w);
-        }
-    }
-}
-
 impl Network {
-    /// Untrained weights after He et al. (2015), which keep the size of signals through rectifiers.
-    fn untrained(base: usize, seed: u64) -> Self {
-        let mut weights = Vec::with_capacity(Self::count(base));
-        for (layer, [inputs, outputs]) in shapes(base).into_iter().enumerate() {
-            let key = Key::new(seed, 2 << 32 | layer as u64);
-            let last = if layer + 1 == LAYERS { 0.3 } else { 1.0 };
-            let sd = last * (2.0 / (inputs * TAPS) as f64).sqrt();
-            weights
-                .extend((0..inputs * outputs * TAPS).map(|i| (sd * key.normal(i as u32)) as f32));
-            weights.extend(std::iter::repeat_n(0.0, outputs));
-        }
-        Self { base, weights }
-    }
-
     /// Trains a network; `tell` hears each step and its loss. The same bits for any number of
     /// threads.
     ///
@@ -221,11 +186,9 @@ impl Network {
     ) -> Result<Self, SimulateError> {
         let sections = sections(recipe.plan, recipe.slices, recipe.seed, job)?;
         let noise = Noise::new(recipe.plan, recipe.noises, recipe.seed, job)?;
-        let mut network = Self::untrained(recipe.base, recipe.seed);
-        let mut optimiser = Optimiser {
-            means: vec![0.0; network.weights.len()],
-            squares: vec![0.0; network.weights.len()],
-        };
+        let mut network = Self(Unet::untrained(shape(recipe.base), recipe.seed));
+        let mut optimiser = Optimiser::new(&network.0);
+        let schedule = Schedule { rate: recipe.rate, steps: recipe.steps };
         for step in 0..recipe.steps {
             job.step(step, recipe.steps)?;
             let learn = |i: usize| {
@@ -234,28 +197,12 @@ impl Network {
                     &noise,
                     Key::new(recipe.seed, 3 << 40 | (step * recipe.batch + i) as u64),
                 );
-                let passage = network.pass(lesson.seen.clone(), true);
-                let (loss, gradient) = lesson.loss(&passage.outputs[LAYERS - 1]);
-                (loss, network.learn(&passage, gradient))
+                network.0.gradient(lesson.seen.clone(), |out| lesson.loss(out))
             };
             let learnt: Vec<(f32, Vec<f32>)> =
                 (0..recipe.batch).into_par_iter().map(learn).collect();
-            let share = 1.0 / recipe.batch as f32;
-            let (mut loss, mut gradient) = (0.0, vec![0.0; network.weights.len()]);
-            for (l, g) in &learnt {
-                loss += share * l;
-                gradient.iter_mut().zip(g).for_each(|(sum, g)| *sum += share * g);
-            }
-            let warm = ((step + 1) as f32 / 60.0).min(1.0);
-            let cool =
-                0.5 * (1.0 + (std::f32::consts::PI * step as f32 / recipe.steps as f32).cos());
-            optimiser.step(
-                &mut network.weights,
-                &gradient,
-                recipe.rate * warm * cool,
-                recipe.decay,
-                step,
-            );
+            let (loss, gradient) = mean(&learnt);
+            optimiser.step(&mut network.0, &gradient, schedule.at(step), recipe.decay);
             tell(step, loss, &network);
         }
         Ok(network)
@@ -277,50 +224,37 @@ pub fn noisy(section: &Section, noise: &Noise, key: Key) -> Grid<f32> {
 mod tests {
     use super::*;
 
-    /// The gradient of the loss against central differences, for weights of every layer. Rectifiers
-    /// and maxima have corners, which a small step rarely crosses.
+    /// The gradient of the loss by what the network gives, against central differences.
     #[test]
     fn gradient_equals_differences() {
         let (w, h) = (20, 12);
         let key = Key::new(5, 0);
-        let mut seen = Planes::new(CT, w, h);
-        for (plane, y) in (0..CT).flat_map(|p| (0..h).map(move |y| (p, y))) {
-            seen.row_mut(plane, y)
-                .iter_mut()
-                .enumerate()
-                .for_each(|(x, v)| *v = key.unit((plane * h * w + y * w + x) as u32) - 0.3);
-        }
         let truth = (0..w * h)
             .map(|i| if i % 3 == 0 { [0.1, 0.6, 0.1, 0.2] } else { [0.7, 0.1, 0.2, 0.0] })
             .collect();
+        let seen = Planes::new(CT, w, h);
         let lesson =
             TrainingSample { seen, truth, counts: (0..w * h).map(|i| i % 7 != 0).collect() };
-        let mut network = Network::untrained(4, 3);
-        let loss = |network: &Network| {
-            lesson.loss(&network.pass(lesson.seen.clone(), true).outputs[LAYERS - 1]).0
-        };
-        let passage = network.pass(lesson.seen.clone(), true);
-        let (_, gradient) = lesson.loss(&passage.outputs[LAYERS - 1]);
-        let learnt = network.learn(&passage, gradient);
-        for layer in 0..LAYERS {
-            let [weights, biases] = network.places(layer);
-            for range in [weights, biases] {
-                let at = (range.start..range.end)
-                    .max_by(|&a, &b| learnt[a].abs().total_cmp(&learnt[b].abs()))
-                    .unwrap();
-                let (old, step) = (network.weights[at], 1e-3);
-                let sides = [old + step, old - step].map(|v| {
-                    network.weights[at] = v;
-                    loss(&network)
-                });
-                network.weights[at] = old;
-                let difference = (sides[0] - sides[1]) / (2.0 * step);
-                assert!(
-                    (difference - learnt[at]).abs() < 0.05 * learnt[at].abs() + 5e-4,
-                    "layer {layer}: {difference} and {}",
-                    learnt[at]
-                );
+        let mut out = Planes::new(CLASSES, w, h);
+        for (plane, y) in (0..CLASSES).flat_map(|p| (0..h).map(move |y| (p, y))) {
+            for (x, v) in out.row_mut(plane, y).iter_mut().enumerate() {
+                *v = 4.0 * key.unit(((plane * h + y) * w + x) as u32) - 2.0;
             }
+        }
+        let (_, gradient) = lesson.loss(&out);
+        for (plane, y) in (0..CLASSES).flat_map(|p| (0..h).map(move |y| (p, y))) {
+            let x = (5 * plane + 7 * y) % w;
+            let (old, step) = (out.row(plane, y)[x], 0.05);
+            let [up, down] = [old + step, old - step].map(|v| {
+                out.row_mut(plane, y)[x] = v;
+                lesson.loss(&out).0
+            });
+            out.row_mut(plane, y)[x] = old;
+            let (difference, told) = ((up - down) / (2.0 * step), gradient.row(plane, y)[x]);
+            assert!(
+                (difference - told).abs() < 0.03 * told.abs() + 2e-5,
+                "plane {plane}, row {y}: {difference} and {told}"
+            );
         }
     }
 }

@@ -20,6 +20,8 @@ pub(super) struct Seed {
     pub(super) length: f32,
     /// m.
     pub(super) width: f32,
+    /// Depth over width; none is shallower than 2 mm.
+    pub(super) depth: f32,
     /// How much it wanders: rad per √m.
     pub(super) unrest: f32,
     /// Forks per metre.
@@ -72,10 +74,75 @@ pub(super) fn grow(seed: Seed, key: Key) -> Vec<CrackSurface> {
             at += step * Vec2::new(now.cos(), now.sin());
         }
         let across = Vec2::new(-seed.way.sin(), seed.way.cos());
-        let depth = (20.0 * seed.width).clamp(6e-3, 0.08);
+        let depth = (seed.depth * seed.width).clamp(2e-3, 0.08);
         all.push(CrackSurface { mouth, normal: across.extend(0.0), depth });
     }
     all
+}
+
+/// What breaks a face into pieces: cracks along the borders of cells like those of dried mud.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Pieces {
+    pub(super) step: f32,
+    /// Where the middle is, m.
+    pub(super) at: Vec2,
+    /// rad.
+    pub(super) way: f32,
+    /// Across a piece, m.
+    pub(super) size: f32,
+    /// Pieces from the middle to the outermost.
+    pub(super) reach: i32,
+    /// m.
+    pub(super) width: f32,
+}
+
+/// The borders of all pieces, here and there one missing. Corners are those of a wall of bricks,
+/// pushed about, so that three cracks meet at each.
+pub(super) fn break_up(pieces: Pieces, key: Key) -> Vec<CrackSurface> {
+    let mut all = Vec::new();
+    let turn = Vec2::from_angle(pieces.way);
+    let corner = |i: i32, j: i32| {
+        let key = key.split(1, (i + 64) as u32 * 128 + (j + 64) as u32);
+        let push = 0.55 * (Vec2::from(key.pair(0)) - 0.5);
+        pieces.at + pieces.size * turn.rotate(Vec2::new(i as f32, j as f32) * 0.75 + push)
+    };
+    let far = pieces.reach;
+    for (i, j) in (-far..far).flat_map(|i| (-far..far).map(move |j| (i, j))) {
+        for (to, there) in [((i + 1, j), true), ((i, j + 1), (i + j).rem_euclid(2) == 0)] {
+            let mut draw = Draw::new(key.split(2, all.len() as u32));
+            let missing = draw.chance(0.15);
+            if there && !missing {
+                let ends = [corner(i, j), corner(to.0, to.1)];
+                all.push(border(ends, pieces, &mut draw));
+            }
+        }
+    }
+    all
+}
+
+/// A crack from one corner to another, swaying by the sum of a few waves.
+fn border([from, to]: [Vec2; 2], pieces: Pieces, draw: &mut Draw) -> CrackSurface {
+    let way = to - from;
+    let steps = ((way.length() / pieces.step) as usize).clamp(4, 400);
+    let waves: [f32; 9] = std::array::from_fn(|k| draw.normal() as f32 * 0.08 / (k + 1) as f32);
+    let mut swell = Swell::new(draw);
+    let mut mouth = Vec::with_capacity(steps + 1);
+    for n in 0..=steps {
+        let s = n as f32 / steps as f32;
+        let sway: f32 = waves
+            .iter()
+            .enumerate()
+            .map(|(k, a)| a * ((k + 1) as f32 * std::f32::consts::PI * s).sin())
+            .sum();
+        let width = pieces.width * swell.next(way.length() / steps as f32, draw);
+        mouth.push(Mouth {
+            at: (from + s * way + sway * way.perp()).extend(0.0),
+            outward: Vec3::Z,
+            width: width.max(LEAST * pieces.width),
+        });
+    }
+    let depth = (20.0 * pieces.width).clamp(6e-3, 0.08);
+    CrackSurface { mouth, normal: way.perp().normalize_or(Vec2::X).extend(0.0), depth }
 }
 
 /// A width's factor along a course: it swells, shrinks, and here and there nearly closes.

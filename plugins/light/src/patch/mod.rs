@@ -74,7 +74,11 @@ impl Patch {
         let lit = Arc::new(LitScene::build(Arc::new(scene), job)?);
         let settings = RenderSettings {
             sides: Sides::Primal,
-            rule: WalkRule { max_order: ORDERS, ..WalkRule::default() },
+            rule: WalkRule {
+                max_order: ORDERS,
+                alike: u64::from(size) * u64::from(size),
+                ..WalkRule::default()
+            },
             seed: u64::from(key.0) << 32 | u64::from(key.1),
             samples: Some(samples),
             orders: false,

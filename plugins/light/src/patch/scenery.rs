@@ -10,7 +10,7 @@ use intrados_scene::{
 };
 use intrados_stage::random::{Draw, Key};
 
-use super::course::{Seed, grow};
+use super::course::{Pieces, Seed, break_up, grow};
 
 /// A patch before it is seen.
 pub(super) struct Drawn {
@@ -33,11 +33,11 @@ struct Builder {
 /// The patch of `key`, `size` pixels along a side.
 pub(super) fn draw(key: Key, size: u32) -> Drawn {
     let mut draw = Draw::new(key);
-    let side = draw.log_between(0.15, 1.5) as f32;
+    let side = draw.log_between(0.1, 1.2) as f32;
     let pixel = side / size as f32;
     let mut builder = Builder { draw, key, side, scene: Scene::default() };
     let camera = builder.camera(size);
-    builder.face();
+    builder.face(pixel);
     let cracks = builder.cracks(pixel);
     let spalls = builder.spalls();
     builder.before();
@@ -103,7 +103,7 @@ impl Builder {
     }
 
     /// A piece of wall or paving, with what formwork, weather and people left on it.
-    fn face(&mut self) {
+    fn face(&mut self, pixel: f32) {
         let kinds = [
             FinishKind::Board,
             FinishKind::Board,
@@ -112,12 +112,18 @@ impl Builder {
             FinishKind::Plaster,
             FinishKind::Asphalt,
             FinishKind::Brushed,
+            FinishKind::Asphalt,
+            FinishKind::Plaster,
             FinishKind::Shotcrete,
+            FinishKind::Broken,
         ];
         let kind = kinds[self.draw.count(0, kinds.len() - 1)];
         let worn = self.between(0.0, 1.0);
         let (rust, salt) = (self.draw.chance(0.2), self.draw.chance(0.2));
-        let finish = Finish::new(kind, self.key.split(1, 0), worn).stained(rust, salt);
+        let mut finish = Finish::new(kind, self.key.split(1, 0), worn).stained(rust, salt);
+        if self.draw.chance(0.8) {
+            finish = finish.lined(pixel);
+        }
         let material = Material {
             name: "face".into(),
             assumed: false,
@@ -170,19 +176,34 @@ impl Builder {
         }
     }
 
-    /// None to three cracks, from a quarter of a pixel to a dozen wide.
+    /// None to three cracks, from a quarter of a pixel to a dozen wide, or a face in pieces.
     fn cracks(&mut self, pixel: f32) -> Vec<CrackSurface> {
-        let number = [0, 0, 1, 1, 1, 2, 2, 3][self.draw.count(0, 7)];
+        if self.draw.chance(0.06) {
+            let width = self.log(0.4, 3.5) * pixel;
+            let pieces = Pieces {
+                step: (2.0 * pixel).min(4e-3),
+                at: self.somewhere(1.0),
+                way: self.between(0.0, 2.0 * PI),
+                size: self.log(0.22, 0.6) * self.side,
+                reach: self.draw.count(1, 4) as i32,
+                width: width.clamp(5e-5, 15e-3),
+            };
+            return break_up(pieces, self.key.split(3, 0));
+        }
+        let number = [0, 0, 1, 1, 1, 1, 2, 2, 2, 3][self.draw.count(0, 9)];
         let mut cracks = Vec::new();
         for n in 0..number {
-            let widest = if self.draw.chance(0.15) { 14.0 } else { 4.0 };
-            let pixels = self.log(0.25, widest);
+            let wide = self.draw.chance(0.3);
+            let pixels = if wide { self.log(2.5, 16.0) } else { self.log(0.35, 4.0) };
+            let (way, length) = (self.between(0.0, 2.0 * PI), self.log(0.4, 2.5) * self.side);
             let seed = Seed {
                 step: (2.0 * pixel).min(4e-3),
-                at: self.somewhere(1.3),
-                way: self.between(0.0, 2.0 * PI),
-                length: self.log(0.3, 2.5) * self.side,
-                width: (pixels * pixel).clamp(5e-5, 15e-3),
+                // Most of it passes through the picture, wherever it begins.
+                at: self.somewhere(0.8) - 0.5 * length * Vec2::from_angle(way),
+                way,
+                length,
+                width: (pixels * pixel).clamp(5e-5, 20e-3),
+                depth: self.log(2.0, 30.0),
                 unrest: self.log(0.5, 2.5) / self.side.sqrt(),
                 forks: if self.draw.chance(0.4) { self.log(0.5, 4.0) / self.side } else { 0.0 },
                 free: self.draw.chance(0.6),

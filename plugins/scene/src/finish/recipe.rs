@@ -53,6 +53,44 @@ impl Finish {
     }
 }
 
+impl Finish {
+    /// The same with lines that are no cracks, as whoever looks for cracks must learn to leave
+    /// alone: narrow seams, pencil and chalk, scratches, thin runs, specks, rims of covers. They
+    /// are as fine as a picture of so many metres a pixel can show.
+    #[must_use]
+    pub fn lined(mut self, pixel: f32) -> Self {
+        let mut draw = Dice(Draw::new(self.key.split(3, 0)));
+        for share in [0.45, 0.2] {
+            if draw.chance(share) {
+                self.reliefs.push(seams(&mut draw, pixel));
+            }
+        }
+        if draw.chance(0.45) {
+            self.reliefs.push(coarse(&mut draw, pixel));
+        }
+        if draw.chance(0.4) {
+            self.reliefs.push(pinholes(&mut draw, pixel));
+        }
+        if draw.chance(0.08) {
+            self.reliefs.push(covers(&mut draw, pixel));
+        }
+        for share in [0.5, 0.3] {
+            if draw.chance(share) {
+                self.marks.push(specks(&mut draw, pixel));
+            }
+        }
+        if draw.chance(0.3) {
+            self.marks.push(thin_runs(&mut draw, pixel));
+        }
+        for share in [0.35, 0.15] {
+            if draw.chance(share) {
+                self.marks.push(long_lines(&mut draw, pixel));
+            }
+        }
+        self
+    }
+}
+
 /// Draws in single precision.
 struct Dice(Draw);
 
@@ -402,6 +440,89 @@ fn scratches(draw: &mut Dice) -> Mark {
         share: draw.between(0.1, 0.5),
         colour: Vec3::splat(if draw.chance(0.7) { 0.65 } else { 0.08 }),
         strength: draw.between(0.3, 0.9),
+        straight: true,
+    })
+}
+
+/// Many small bug-holes.
+fn pinholes(draw: &mut Dice, pixel: f32) -> Relief {
+    Relief::Pores(Pores { largest: pixel * draw.log(1.5, 5.0), share: draw.between(0.3, 0.95) })
+}
+
+/// Grains that stand out, from sand to rendered pebbles.
+fn coarse(draw: &mut Dice, pixel: f32) -> Relief {
+    let size = pixel * draw.log(4.0, 40.0);
+    Relief::Rough(Rough {
+        size: Vec2::splat(size),
+        octaves: 5,
+        gain: draw.between(0.55, 0.85),
+        amplitude: size * draw.log(0.01, 0.1),
+        dark: draw.between(0.0, 0.6),
+    })
+}
+
+/// Seams of narrow boards or strips, dark and hardly ever broken.
+fn seams(draw: &mut Dice, pixel: f32) -> Relief {
+    let (near, far) = (pixel * draw.log(30.0, 250.0), pixel * draw.log(150.0, 1000.0));
+    Relief::Joints(Joints {
+        panel: if draw.chance(0.75) { vec2(near, far) } else { vec2(far, near) },
+        // Half of one that is two pixels wide is left to see.
+        width: pixel * draw.log(1.6, 6.0),
+        depth: pixel * draw.between(-0.3, 0.6),
+        tone: draw.between(0.0, 0.2),
+        dark: draw.between(0.3, 0.97),
+    })
+}
+
+/// Round covers and plugs with a dark rim.
+fn covers(draw: &mut Dice, pixel: f32) -> Relief {
+    let radius = pixel * draw.log(6.0, 50.0);
+    let spacing = radius * draw.between(4.0, 12.0);
+    Relief::Holes(Holes {
+        spacing: vec2(spacing, spacing * draw.between(0.7, 1.5)),
+        radius,
+        depth: radius * draw.log(0.02, 0.15),
+        tone: draw.between(0.75, 1.2),
+    })
+}
+
+/// Small sharp spots of dirt, drawn out along the face.
+fn specks(draw: &mut Dice, pixel: f32) -> Mark {
+    Mark::Patches(Patches {
+        cover: Cover {
+            matter: Matter::Dirt,
+            colour: Vec3::new(0.6, 0.58, 0.55) * draw.log(0.3, 1.2),
+            replaces: false,
+            strength: draw.between(0.4, 1.0),
+        },
+        size: pixel * draw.log(4.0, 40.0),
+        tall: draw.log(0.5, 5.0),
+        from: draw.between(0.1, 0.5),
+        border: draw.log(0.02, 0.15),
+    })
+}
+
+/// What a single drop left on its way down.
+fn thin_runs(draw: &mut Dice, pixel: f32) -> Mark {
+    let dark = draw.chance(0.7);
+    let cover = Cover {
+        matter: Matter::Dirt,
+        colour: Vec3::new(1.0, 0.97, 0.93) * if dark { draw.log(0.2, 0.75) } else { 1.4 },
+        replaces: false,
+        strength: draw.between(0.4, 1.0),
+    };
+    let width = pixel * draw.log(2.5, 14.0);
+    runs(draw, cover, 9.0 * width, width, pixel * 150.0, 0.5)
+}
+
+/// Pencil, chalk, scratches, the edge of a trowel: long, straight or slightly bowed.
+fn long_lines(draw: &mut Dice, pixel: f32) -> Mark {
+    Mark::Strokes(Strokes {
+        size: pixel * draw.log(30.0, 200.0),
+        width: pixel * draw.log(0.5, 4.0),
+        share: draw.between(0.2, 0.9),
+        colour: Vec3::splat(if draw.chance(0.65) { draw.log(0.03, 0.2) } else { 0.7 }),
+        strength: draw.between(0.3, 0.95),
         straight: true,
     })
 }

@@ -9,16 +9,16 @@ use wide::f32x8;
 
 /// Pixels in a tile.
 const TILE: usize = 16;
-/// Output planes in a tile.
-pub(super) const BLOCK: usize = 4;
+/// Output planes in a tile: what planes come in multiples of.
+pub const BLOCK: usize = 4;
 /// Taps of a kernel.
 pub(super) const TAPS: usize = 9;
 
 /// A stack of planes of one size.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Planes {
-    pub(super) width: usize,
-    pub(super) height: usize,
+pub struct Planes {
+    width: usize,
+    height: usize,
     /// Floats from one row to the next.
     stride: usize,
     data: Vec<f32>,
@@ -27,11 +27,11 @@ pub(super) struct Planes {
 /// Memory of stacks that are no longer needed. Asked from the system anew for every convolution of
 /// a large tile, it would cost a fifth of all time.
 #[derive(Debug, Default)]
-pub(super) struct Spare(Vec<Vec<f32>>);
+pub struct Spare(Vec<Vec<f32>>);
 
 impl Spare {
     /// Takes the memory of a stack.
-    pub(super) fn give(&mut self, planes: Planes) {
+    pub fn give(&mut self, planes: Planes) {
         self.0.push(planes.data);
     }
 
@@ -50,14 +50,28 @@ impl Spare {
 
 impl Planes {
     /// All zero.
-    pub(super) fn new(planes: usize, width: usize, height: usize) -> Self {
+    #[must_use]
+    pub fn new(planes: usize, width: usize, height: usize) -> Self {
         Self::of_spare(planes, width, height, &mut Spare::default())
     }
 
     /// All zero, in spare memory.
-    pub(super) fn of_spare(planes: usize, width: usize, height: usize, spare: &mut Spare) -> Self {
+    #[must_use]
+    pub fn of_spare(planes: usize, width: usize, height: usize, spare: &mut Spare) -> Self {
         let stride = width.next_multiple_of(TILE) + 2;
         Self { width, height, stride, data: spare.zeros(planes * stride * (height + 2)) }
+    }
+
+    /// Pixels across.
+    #[must_use]
+    pub const fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Pixels down.
+    #[must_use]
+    pub const fn height(&self) -> usize {
+        self.height
     }
 
     /// Floats of one plane.
@@ -66,18 +80,20 @@ impl Planes {
     }
 
     /// Number of planes.
-    pub(super) fn planes(&self) -> usize {
+    #[must_use]
+    pub fn planes(&self) -> usize {
         self.data.len() / self.area()
     }
 
     /// Row `y` of plane `plane`.
-    pub(super) fn row(&self, plane: usize, y: usize) -> &[f32] {
+    #[must_use]
+    pub fn row(&self, plane: usize, y: usize) -> &[f32] {
         let at = plane * self.area() + (y + 1) * self.stride + 1;
         &self.data[at..at + self.width]
     }
 
     /// The same, to write to.
-    pub(super) fn row_mut(&mut self, plane: usize, y: usize) -> &mut [f32] {
+    pub fn row_mut(&mut self, plane: usize, y: usize) -> &mut [f32] {
         let at = plane * self.area() + (y + 1) * self.stride + 1;
         &mut self.data[at..at + self.width]
     }
@@ -157,7 +173,7 @@ impl Planes {
         full
     }
 
-    /// The gradient of [`Planes::doubled`].
+    /// The gradient of doubled pixels.
     pub(super) fn halved(&self) -> Self {
         self.of_fours(&mut Spare::default(), |[a, b, c, d]| a + b + c + d)
     }

@@ -1,0 +1,32 @@
+//! Trains the network that reads damage on the lessons of a folder (see the example `lessons`):
+//! `cargo run --release -p intrados-photo --example train -- RECIPE.ron LESSONS OUT.f32`.
+
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "an example for people")]
+
+use std::path::PathBuf;
+
+use intrados_photo::marks::{Reader, lesson::Lesson, train::Recipe};
+use intrados_stage::{Job, cpu_seconds};
+
+fn main() {
+    let mut args = std::env::args().skip(1).map(PathBuf::from);
+    let [recipe, lessons, out] = std::array::from_fn(|_| args.next().expect("three paths"));
+    let recipe: Recipe = ron::from_str(&std::fs::read_to_string(recipe).unwrap()).unwrap();
+    let read = |n: usize| std::fs::read(lessons.join(format!("{n:05}.lesson"))).unwrap();
+    let kept: Vec<Vec<u8>> = (0..recipe.lessons).map(read).collect();
+    let lesson = |n: usize| Lesson::from_bytes(&kept[n]).expect("a whole lesson");
+    let (mut sum, begin) = (0.0, cpu_seconds());
+    let tell = |step: usize, loss: f32, reader: &Reader| {
+        sum += loss;
+        if (step + 1) % 50 == 0 {
+            println!("{}: {:.4}, {:.0} CPU-s", step + 1, sum / 50.0, cpu_seconds() - begin);
+            sum = 0.0;
+        }
+        if (step + 1) % 500 == 0 {
+            std::fs::write(out.with_extension(format!("{}.f32", step + 1)), reader.to_bytes())
+                .unwrap();
+        }
+    };
+    let reader = Reader::trained(&recipe, lesson, &Job::default(), tell).unwrap();
+    std::fs::write(&out, reader.to_bytes()).unwrap();
+}

@@ -1,0 +1,202 @@
+//! Damage that is seen in a photograph: which pixels show a crack, missing cover, bared steel,
+//! rust, efflorescence.
+//!
+//! A small U-Net looks at every pixel. It was trained by [`train`] on rendered pictures alone
+//! ([`lesson`]): no photograph was shown to it, and only the thresholds below were chosen on some.
+//! `assets/network` holds the weights and how they came to be.
+
+mod camera;
+pub mod lesson;
+mod outline;
+mod sample;
+mod sight;
+pub mod train;
+
+use std::sync::LazyLock;
+
+use glam::Vec3;
+use intrados_raster::{
+    Grid, Mask,
+    network::{Planes, Shape, Spare, Unet},
+};
+use intrados_stage::{Cancelled, Job};
+
+use sight::{CELL, PIXELS, PLANES, Sight};
+
+/// A kind of damage that is seen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Mark {
+    /// A crack.
+    Crack,
+    /// Missing cover.
+    Spall,
+    /// Bared steel.
+    Steel,
+    /// Rust on the face.
+    Rust,
+    /// Efflorescence on the face.
+    Efflorescence,
+}
+
+impl Mark {
+    /// All of them, in the order of the network's planes.
+    pub const ALL: [Self; MARKS] =
+        [Self::Crack, Self::Spall, Self::Steel, Self::Rust, Self::Efflorescence];
+}
+
+/// Kinds of damage.
+const MARKS: usize = 5;
+
+/// Planes of each level of the carried network.
+const LEVELS: [usize; 4] = [16, 32, 48, 64];
+/// Edge of what is looked at in one go, pixels.
+const TILE: usize = 1024;
+/// What is looked at around it, a multiple of what pools alike: convolutions and pooling reach 59
+/// cells.
+const MARGIN: usize = 128;
+
+/// The weights that the program carries, as little-endian floats.
+static CARRIED: &[u8] = include_bytes!("../../../../assets/network/photo.f32");
+
+static BUILTIN: LazyLock<Option<Reader>> = LazyLock::new(|| Reader::from_bytes(&LEVELS, CARRIED));
+
+/// A trained network that reads damage.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Reader(Unet);
+
+/// How probable each kind of damage is, pixel by pixel.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Marks {
+    grids: [Grid<f32>; MARKS],
+}
+
+impl Marks {
+    /// How probable a kind of damage is, in [0, 1].
+    #[must_use]
+    pub fn of(&self, mark: Mark) -> &Grid<f32> {
+        &self.grids[mark as usize]
+    }
+
+    /// Where there are cracks.
+    #[must_use]
+    pub fn cracks(&self) -> Mask {
+        outline::lines(self.of(Mark::Crack), outline::CRACKS)
+    }
+
+    /// Where there is damage of a kind.
+    #[must_use]
+    pub fn areas(&self, mark: Mark) -> Mask {
+        match mark {
+            Mark::Crack => self.cracks(),
+            _ => outline::areas(self.of(mark)),
+        }
+    }
+}
+
+/// Reads damage in linear light of any scale with the network that the program carries; what is
+/// not `known` shows none. Pixels should be some tenths to some millimetres on the face.
+///
+/// # Errors
+/// The job was cancelled.
+pub fn marks(light: &Grid<Vec3>, known: &Mask, job: &Job) -> Result<Marks, Cancelled> {
+    match Reader::builtin() {
+        Some(reader) => reader.marks(light, known, job),
+        None => Ok(none(light.width, light.height)),
+    }
+}
+
+fn none(width: usize, height: usize) -> Marks {
+    Marks { grids: std::array::from_fn(|_| Grid::new(width, height, 0.0)) }
+}
+
+fn shape(levels: &[usize]) -> Shape {
+    Shape { inputs: PLANES * PIXELS, levels: levels.to_vec(), outputs: MARKS * PIXELS }
+}
+
+impl Reader {
+    /// The network that the program carries; `None` if its weights are damaged.
+    #[must_use]
+    pub fn builtin() -> Option<&'static Self> {
+        BUILTIN.as_ref()
+    }
+
+    /// Reads weights, little-endian floats, of a network with so many planes a level.
+    #[must_use]
+    pub fn from_bytes(levels: &[usize], bytes: &[u8]) -> Option<Self> {
+        Unet::from_bytes(shape(levels), bytes).map(Self)
+    }
+
+    /// The weights as little-endian floats.
+    #[must_use]
+    pub fn to_bytes(&self) -> Vec<u8> {
+        self.0.to_bytes()
+    }
+
+    /// Reads damage in linear light of any scale; what is not `known` shows none.
+    ///
+    /// # Errors
+    /// The job was cancelled.
+    pub fn marks(&self, light: &Grid<Vec3>, known: &Mask, job: &Job) -> Result<Marks, Cancelled> {
+        self.marks_by(TILE, light, known, job)
+    }
+
+    fn marks_by(
+        &self,
+        tile: usize,
+        light: &Grid<Vec3>,
+        known: &Mask,
+        job: &Job,
+    ) -> Result<Marks, Cancelled> {
+        let sight = Sight::new(light, known, job)?;
+        let mut marks = none(light.width, light.height);
+        let mut spare = Spare::default();
+        for y in (0..light.height).step_by(tile) {
+            for x in (0..light.width).step_by(tile) {
+                self.tile(&sight, [x, y], tile, &mut marks, &mut spare, job)?;
+            }
+        }
+        for grid in &mut marks.grids {
+            let unknown = grid.data.iter_mut().zip(&known.data).filter(|(_, known)| !**known);
+            unknown.for_each(|(v, _)| *v = 0.0);
+        }
+        Ok(marks)
+    }
+
+    /// Fills the tile whose top left is at `from`.
+    fn tile(
+        &self,
+        sight: &Sight,
+        from: [usize; 2],
+        tile: usize,
+        marks: &mut Marks,
+        spare: &mut Spare,
+        job: &Job,
+    ) -> Result<(), Cancelled> {
+        let size = sight.size();
+        let first = from.map(|at| at.saturating_sub(MARGIN));
+        let cells = [0, 1].map(|k| {
+            let last = (from[k] + tile + MARGIN).min(size[k]);
+            (last - first[k]).div_ceil(CELL).next_multiple_of(self.0.shape().divisor())
+        });
+        let out = self.0.look(sight.cells(first, cells), spare, job)?;
+        for (mark, grid) in marks.grids.iter_mut().enumerate() {
+            for y in from[1]..(from[1] + tile).min(size[1]) {
+                let row = &mut grid.data[y * size[0]..][..size[0]];
+                for (x, value) in row.iter_mut().enumerate().skip(from[0]).take(tile) {
+                    let score = score(&out, mark, [x - first[0], y - first[1]]);
+                    *value = 1.0 / (1.0 + (-score).exp());
+                }
+            }
+        }
+        spare.give(out);
+        Ok(())
+    }
+}
+
+/// What the network says of a mark at a pixel.
+fn score(out: &Planes, mark: usize, [x, y]: [usize; 2]) -> f32 {
+    out.row(mark * PIXELS + y % CELL * CELL + x % CELL, y / CELL)[x / CELL]
+}
+
+#[cfg(test)]
+mod tests;

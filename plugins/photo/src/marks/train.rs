@@ -1,0 +1,179 @@
+//! Training on lessons: cross entropy of every kind of damage, soft Dice of cracks and of missing
+//! cover.
+
+use intrados_raster::network::{Optimiser, Planes, Schedule, Unet, mean};
+use intrados_stage::{Cancelled, Job, random::Key};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use super::{MARKS, PIXELS, Reader, lesson::Lesson, sample::Sample, score, shape, sight::CELL};
+
+/// How the network came to be: recorded beside the weights, and all that is needed to make them
+/// again.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Recipe {
+    /// Planes of each level, multiples of 4.
+    pub levels: Vec<usize>,
+    /// Seed of the lessons.
+    pub lessons_seed: u64,
+    /// Rendered lessons.
+    pub lessons: usize,
+    /// Seed of everything else.
+    pub seed: u64,
+    /// Steps of the optimiser.
+    pub steps: usize,
+    /// Crops a step.
+    pub batch: usize,
+    /// Edge of a crop, pixels, a multiple of 16.
+    pub crop: usize,
+    /// Highest learning rate.
+    pub rate: f32,
+    /// Weight decay.
+    pub decay: f32,
+    /// How often a crack's pixel counts in the cross entropy.
+    pub crack: f32,
+}
+
+/// How much the cross entropy of each kind counts.
+const SHARES: [f32; MARKS] = [1.0, 0.5, 0.3, 0.3, 0.3];
+/// How much soft Dice of each kind counts.
+const DICE: [f32; MARKS] = [0.5, 0.2, 0.0, 0.0, 0.0];
+
+impl Sample {
+    /// The loss of `out` and its gradient by what the network gives.
+    fn loss(&self, out: &Planes, crack: f32) -> (f32, Planes) {
+        let (w, n) = (self.truth.width, self.truth.data.len());
+        let mut gradient = Planes::new(MARKS * PIXELS, out.width(), out.height());
+        let mut loss = 0.0;
+        for mark in 0..MARKS {
+            let weight = if mark == 0 { crack } else { 1.0 };
+            let counts = |i: usize| mark > 0 || self.counts.data[i];
+            let pixels = (0..n).filter(|&i| counts(i)).count().max(1) as f32;
+            let chance: Vec<f32> =
+                (0..n).map(|i| 1.0 / (1.0 + (-score(out, mark, [i % w, i / w])).exp())).collect();
+            let (mut both, mut sum, mut entropy) = (1.0_f32, 1.0_f32, 0.0_f32);
+            for i in (0..n).filter(|&i| counts(i)) {
+                let (p, t) = (chance[i], self.truth.data[i][mark]);
+                entropy -= weight * t * p.max(1e-7).ln() + (1.0 - t) * (1.0 - p).max(1e-7).ln();
+                both += 2.0 * p * t;
+                sum += p + t;
+            }
+            loss += SHARES[mark] * entropy / pixels + DICE[mark] * (1.0 - both / sum);
+            for i in (0..n).filter(|&i| counts(i)) {
+                let (p, t) = (chance[i], self.truth.data[i][mark]);
+                let entropy = (1.0 - t) * p - weight * t * (1.0 - p);
+                let dice = (both - 2.0 * t * sum) / (sum * sum) * p * (1.0 - p);
+                let (x, y) = (i % w, i / w);
+                let plane = mark * PIXELS + y % CELL * CELL + x % CELL;
+                gradient.row_mut(plane, y / CELL)[x / CELL] =
+                    SHARES[mark] * entropy / pixels + DICE[mark] * dice;
+            }
+        }
+        (loss, gradient)
+    }
+}
+
+impl Reader {
+    /// Trains a network on the lessons that `lesson` reads; `tell` hears each step and its loss.
+    /// The same bits for any number of threads.
+    ///
+    /// # Errors
+    /// The job was cancelled.
+    pub fn trained(
+        recipe: &Recipe,
+        lesson: impl Fn(usize) -> Lesson + Sync,
+        job: &Job,
+        mut tell: impl FnMut(usize, f32, &Self),
+    ) -> Result<Self, Cancelled> {
+        let mut reader = Self(Unet::untrained(shape(&recipe.levels), recipe.seed));
+        let mut optimiser = Optimiser::new(&reader.0);
+        let schedule = Schedule { rate: recipe.rate, steps: recipe.steps };
+        let cells = [recipe.crop / CELL; 2];
+        for step in 0..recipe.steps {
+            job.step(step, recipe.steps)?;
+            let learn = |i: usize| {
+                let key = Key::new(recipe.seed, 3 << 40 | (step * recipe.batch + i) as u64);
+                let number = (key.unit64(0) * recipe.lessons as f64) as usize;
+                let sample = Sample::drawn(&lesson(number), recipe.crop, key.split(1, 0))?;
+                let seen = sample.sight.cells([0, 0], cells);
+                Ok(reader.0.gradient(seen, |out| sample.loss(out, recipe.crack)))
+            };
+            let learnt: Vec<(f32, Vec<f32>)> =
+                (0..recipe.batch).into_par_iter().map(learn).collect::<Result<_, Cancelled>>()?;
+            let (loss, gradient) = mean(&learnt);
+            optimiser.step(&mut reader.0, &gradient, schedule.at(step), recipe.decay);
+            tell(step, loss, &reader);
+        }
+        Ok(reader)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn recipe() -> Recipe {
+        Recipe {
+            levels: vec![4, 8],
+            lessons_seed: 9,
+            lessons: 2,
+            seed: 1,
+            steps: 4,
+            batch: 3,
+            crop: 64,
+            rate: 3e-3,
+            decay: 1e-4,
+            crack: 5.0,
+        }
+    }
+
+    /// The gradient of the loss by what the network gives, against central differences.
+    #[test]
+    fn gradient_equals_differences() {
+        let lesson = Lesson::render(9, 4, &Job::default()).unwrap();
+        let sample = Sample::drawn(&lesson, 32, Key::new(1, 1)).unwrap();
+        let mut out = Planes::new(MARKS * PIXELS, 16, 16);
+        let places: Vec<_> =
+            (0..MARKS * PIXELS).flat_map(|p| (0..16).map(move |y| (p, y))).collect();
+        for &(plane, y) in &places {
+            for (x, v) in out.row_mut(plane, y).iter_mut().enumerate() {
+                *v = 4.0 * Key::new(plane as u64, y as u64).unit(x as u32) - 2.0;
+            }
+        }
+        let (_, gradient) = sample.loss(&out, 5.0);
+        for (plane, y) in places {
+            let x = (3 * plane + 5 * y) % 16;
+            let (old, step) = (out.row(plane, y)[x], 0.05);
+            let [up, down] = [old + step, old - step].map(|v| {
+                out.row_mut(plane, y)[x] = v;
+                sample.loss(&out, 5.0).0
+            });
+            out.row_mut(plane, y)[x] = old;
+            let (difference, told) = ((up - down) / (2.0 * step), gradient.row(plane, y)[x]);
+            assert!(
+                (difference - told).abs() < 0.03 * told.abs() + 2e-5,
+                "plane {plane}, row {y}: {difference} and {told}"
+            );
+        }
+    }
+
+    #[test]
+    fn training_repeats_to_the_bit_on_any_number_of_threads() {
+        let lessons: Vec<Lesson> =
+            (0..2).map(|n| Lesson::render(9, n, &Job::default()).unwrap()).collect();
+        let trained = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            let mut losses = Vec::new();
+            let read = |n: usize| lessons[n].clone();
+            let reader = pool.install(|| {
+                Reader::trained(&recipe(), read, &Job::default(), |_, loss, _| losses.push(loss))
+            });
+            (reader.unwrap().to_bytes(), losses)
+        };
+        let ((one, losses), (three, again)) = (trained(1), trained(3));
+        assert_eq!(one, three);
+        assert_eq!(losses, again);
+        assert!(losses.iter().all(|l| l.is_finite()));
+    }
+}
