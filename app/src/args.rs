@@ -984,6 +984,9 @@ pub(crate) struct Photo {
     /// cover, rust, efflorescence
     #[arg(long)]
     pub(crate) read: bool,
+    /// Which light is taken off before faces are read; direct and none are for comparison
+    #[arg(long, value_enum, default_value_t = TakenOff::All)]
+    pub(crate) light: TakenOff,
     /// Walks a lamp and pixel of the pictures of light, which are 256 pixels wide
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = value_parser!(u64).range(2..=1 << 20))]
     pub(crate) spp: u64,
@@ -997,6 +1000,17 @@ pub(crate) struct Photo {
     /// Folder for the files
     #[arg(long, value_name = "DIR", default_value = "out")]
     pub(crate) out: PathBuf,
+}
+
+/// Which light is taken off a photograph.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum TakenOff {
+    /// All, as often as it was reflected
+    All,
+    /// What comes straight from the lamps
+    Direct,
+    /// None: faces are read as they look
+    None,
 }
 
 fn between(text: &str, low: f64, high: f64, unit: &str) -> Result<f64, String> {

@@ -105,7 +105,7 @@ pub(crate) fn observed(
     let faces = match read_all(
         &site,
         scene,
-        (&relit, Some(member)),
+        (Some(&relit), Some(member)),
         shot,
         settings.seed,
         &job.part(0.7, 1.0),

@@ -15,7 +15,7 @@ use serde::Serialize;
 
 use super::Work;
 use crate::{
-    args,
+    args::{self, TakenOff},
     failure::{Failure, Outcome},
     output::{self, Files},
     picture::png_of_colours,
@@ -50,7 +50,11 @@ impl Work<'_> {
         shot: (&Photograph, &Located),
         files: &mut Set,
     ) -> Result<Vec<FaceRead>, Failure> {
-        let Some(relit) = relit.filter(|_| self.args.read) else { return Ok(Vec::new()) };
+        // Where light cannot be taken off, nothing is read as if it were.
+        let as_it_looks = self.args.light == TakenOff::None;
+        if !self.args.read || relit.is_none() && !as_it_looks {
+            return Ok(Vec::new());
+        }
         let progress = self.session.watch(format!("reading {name}"));
         let faces = read_all(
             &self.site,

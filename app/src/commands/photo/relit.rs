@@ -5,13 +5,15 @@ use std::collections::BTreeMap;
 use glam::Vec3;
 use intrados_photo::{
     Located, Photograph,
-    relight::{ReflectanceMap, RelightError, RelightSettings, Relit, RelitRecord, merged, relight},
+    relight::{
+        Light, ReflectanceMap, RelightError, RelightSettings, Relit, RelitRecord, merged, relight,
+    },
 };
 use intrados_stage::file::{Set, file_name};
 use serde::Serialize;
 
 use super::Work;
-use crate::{failure::Failure, output::Files, picture::png_of_deep_colours};
+use crate::{args::TakenOff, failure::Failure, output::Files, picture::png_of_deep_colours};
 
 /// Most pixels of all maps together that are kept to be merged: 2 GB.
 const MOST_KEPT: usize = 1 << 26;
@@ -84,13 +86,20 @@ impl Work<'_> {
         name: &str,
         shot: (&Photograph, &Located),
     ) -> Result<(Option<Relit>, Option<String>), Failure> {
-        if !self.args.relight && !self.args.read {
+        let asked = self.args.relight || self.args.read;
+        let light = match self.args.light {
+            TakenOff::All => Light::All,
+            TakenOff::Direct => Light::Direct,
+            TakenOff::None => return Ok((None, None)),
+        };
+        if !asked {
             return Ok((None, None));
         }
         let settings = RelightSettings {
             samples: self.args.spp,
             seed: self.args.seed,
             shadow_error_m: 1e-3 * self.args.shadow_error_mm,
+            light,
             ..RelightSettings::default()
         };
         let _progress = self.session.watch(format!("taking the light off {name}"));

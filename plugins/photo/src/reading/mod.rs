@@ -15,7 +15,7 @@ use serde::Serialize;
 use crate::{
     Located, Photograph, Site,
     face::Surface,
-    map::MapError,
+    map::{MapError, unrolled},
     marks::{Mark, Marks, marks},
     relight::{ReflectanceMap, Relit},
     site::SeenFace,
@@ -78,15 +78,15 @@ pub struct ReadFace {
     pub reading: FaceReading,
 }
 
-/// Reads the faces that a photograph shows, of one member or of all, without the light that fell on
-/// them.
+/// Reads the faces that a photograph shows, of one member or of all: without the light that fell on
+/// them where that is known, else as they look, shadows and all.
 ///
 /// # Errors
 /// [`MapError`]: a map of too many pixels, or the job was cancelled.
 pub fn read_all(
     site: &Site,
     scene: &Scene,
-    (relit, member): (&Relit, Option<usize>),
+    (relit, member): (Option<&Relit>, Option<usize>),
     shot: (&Photograph, &Located),
     seed: u64,
     job: &Job,
@@ -96,13 +96,29 @@ pub fn read_all(
     let count = faces.len();
     let one = |(k, seen): (usize, SeenFace)| {
         job.step(k, count)?;
-        let map = relit.map(site, &seen, shot, own_scale(&seen), job)?;
+        let map = match relit {
+            Some(relit) => relit.map(site, &seen, shot, own_scale(&seen), job)?,
+            None => as_it_looks(site, &seen, shot, job)?,
+        };
         let member = &scene.members[seen.member].id;
-        let under = Under { scene: Some(relit.scene()), member, located: shot.1, seed };
+        let under = Under { scene: relit.map(Relit::scene), member, located: shot.1, seed };
         let reading = read(site, &seen, &map, under, job)?;
         Ok(ReadFace { seen, map, reading })
     };
     faces.into_iter().enumerate().map(one).collect()
+}
+
+/// A face with the light on it, as if that were its reflectance.
+fn as_it_looks(
+    site: &Site,
+    seen: &SeenFace,
+    (photograph, located): (&Photograph, &Located),
+    job: &Job,
+) -> Result<ReflectanceMap, MapError> {
+    let Some(surface) = site.surface(seen.member) else { return Ok(ReflectanceMap::plain(None)) };
+    let shot = (photograph, &located.pose);
+    let face = unrolled(site, surface, &seen.face, shot, own_scale(seen), job)?;
+    Ok(ReflectanceMap::plain(Some(face)))
 }
 
 /// Millimetres of a face to one pixel of the photograph.

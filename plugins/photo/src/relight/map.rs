@@ -26,6 +26,14 @@ pub struct ReflectanceMap {
 }
 
 impl ReflectanceMap {
+    /// Light in place of reflectance, of no known error.
+    pub(crate) fn plain(face: Option<FaceMap>) -> Self {
+        let none = FaceMap { size: [0, 0], mm_px: 1.0, corner: [0.0; 2], light: Vec::new() };
+        let face = face.unwrap_or(none);
+        let log_error = vec![Vec3::INFINITY; face.light.len()];
+        Self { face, log_error, turn: None }
+    }
+
     /// Of green, over what is known.
     #[must_use]
     pub fn median_log_error(&self) -> Option<f32> {
