@@ -12,9 +12,14 @@ fn main() {
     let mut args = std::env::args().skip(1).map(PathBuf::from);
     let [recipe, lessons, out] = std::array::from_fn(|_| args.next().expect("three paths"));
     let recipe: Recipe = ron::from_str(&std::fs::read_to_string(recipe).unwrap()).unwrap();
-    let read = |n: usize| std::fs::read(lessons.join(format!("{n:05}.lesson"))).unwrap();
-    let kept: Vec<Vec<u8>> = (0..recipe.lessons).map(read).collect();
-    let lesson = |n: usize| Lesson::from_bytes(&kept[n]).expect("a whole lesson");
+    let lesson = |n: usize| {
+        let path = lessons.join(format!("{n:05}.lesson"));
+        // It may still be rendered.
+        while !path.exists() {
+            std::thread::sleep(std::time::Duration::from_secs(1));
+        }
+        Lesson::from_bytes(&std::fs::read(path).unwrap()).expect("a whole lesson")
+    };
     let (mut sum, begin) = (0.0, cpu_seconds());
     let tell = |step: usize, loss: f32, reader: &Reader| {
         sum += loss;

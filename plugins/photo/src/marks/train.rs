@@ -17,8 +17,9 @@ pub struct Recipe {
     pub levels: Vec<usize>,
     /// Seed of the lessons.
     pub lessons_seed: u64,
-    /// Rendered lessons.
-    pub lessons: usize,
+    /// Rendered lessons that crops are drawn from at the first and at the last step; their number
+    /// grows evenly, so that training can begin while they are still rendered.
+    pub lessons: [usize; 2],
     /// Seed of everything else.
     pub seed: u64,
     /// Steps of the optimiser.
@@ -33,6 +34,13 @@ pub struct Recipe {
     pub decay: f32,
     /// How often a crack's pixel counts in the cross entropy.
     pub crack: f32,
+}
+
+impl Recipe {
+    fn lessons_at(&self, step: usize) -> usize {
+        let [first, last] = self.lessons;
+        first + last.saturating_sub(first) * step / self.steps.max(1)
+    }
 }
 
 /// How much the cross entropy of each kind counts.
@@ -94,7 +102,7 @@ impl Reader {
             job.step(step, recipe.steps)?;
             let learn = |i: usize| {
                 let key = Key::new(recipe.seed, 3 << 40 | (step * recipe.batch + i) as u64);
-                let number = (key.unit64(0) * recipe.lessons as f64) as usize;
+                let number = (key.unit64(0) * recipe.lessons_at(step) as f64) as usize;
                 let sample = Sample::drawn(&lesson(number), recipe.crop, key.split(1, 0))?;
                 let seen = sample.sight.cells([0, 0], cells);
                 Ok(reader.0.gradient(seen, |out| sample.loss(out, recipe.crack)))
@@ -117,7 +125,7 @@ mod tests {
         Recipe {
             levels: vec![4, 8],
             lessons_seed: 9,
-            lessons: 2,
+            lessons: [1, 2],
             seed: 1,
             steps: 4,
             batch: 3,
