@@ -20,11 +20,11 @@ pub(super) fn taken(light: &Grid<Vec3>, key: Key) -> Grid<Vec3> {
         roots = blurred(&roots, draw.between(0.35, 1.3));
     }
     if draw.chance(0.6) {
-        haze(&mut roots, draw.log_between(0.05, 2.0) as f32);
+        haze(&mut roots, draw.log_between(0.05, 1.5) as f32);
     }
     if draw.chance(0.6) {
-        let strength = draw.log_between(0.01, 0.3) as f32;
-        texture(&mut roots, key.split(1, 0), draw.log_between(0.5, 3.0), strength);
+        let strength = draw.log_between(0.02, 0.35) as f32;
+        texture(&mut roots, key.split(1, 0), draw.log_between(0.5, 4.0), strength);
     }
     if draw.chance(0.5) {
         let rarity = draw.between(1.2, 3.0) as f32;

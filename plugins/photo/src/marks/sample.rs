@@ -33,7 +33,7 @@ impl Frame {
         let smallest = side as f64 / lesson as f64;
         let zoom = match draw.count(0, 9) {
             0..=2 => 1.0,
-            3..=7 => draw.log_between(smallest, 1.8) as f32,
+            3..=6 => draw.log_between(smallest, 1.8) as f32,
             // As one sees who comes close: cracks a dozen pixels wide, with soft borders.
             _ => draw.log_between(1.8, 3.5) as f32,
         };

@@ -17,22 +17,29 @@ pub struct Recipe {
     pub levels: Vec<usize>,
     /// Seed of the lessons.
     pub lessons_seed: u64,
-    /// Rendered lessons.
-    pub lessons: usize,
+    /// Rendered lessons that crops are drawn from at the beginning and at the end of the first
+    /// stage; their number grows evenly, so that training can begin while they are rendered.
+    pub lessons: [usize; 2],
     /// Seed of everything else.
     pub seed: u64,
-    /// Steps of the optimiser.
-    pub steps: usize,
+    /// Steps of the optimiser and its highest rate, stage by stage: each warms up and cools down.
+    pub stages: Vec<(usize, f32)>,
     /// Crops a step.
     pub batch: usize,
     /// Edge of a crop, pixels, a multiple of 16.
     pub crop: usize,
-    /// Highest learning rate.
-    pub rate: f32,
     /// Weight decay.
     pub decay: f32,
     /// How often a crack's pixel counts in the cross entropy.
     pub crack: f32,
+}
+
+impl Recipe {
+    fn lessons_at(&self, step: usize) -> usize {
+        let [first, last] = self.lessons;
+        let growing = self.stages.first().map_or(1, |&(steps, _)| steps.max(1));
+        first + last.saturating_sub(first) * step.min(growing) / growing
+    }
 }
 
 /// How much the cross entropy of each kind counts.
@@ -75,37 +82,53 @@ impl Sample {
 }
 
 impl Reader {
-    /// Trains a network on the lessons that `lesson` reads; `tell` hears each step and its loss.
-    /// The same bits for any number of threads.
+    /// Trains a network on the lessons that `lesson` reads; `tell` hears each step, its loss, and
+    /// whether a stage is over. It goes on after so many stages `done`, with the weights that they
+    /// gave. The same bits for any number of threads, and wherever it goes on.
     ///
     /// # Errors
     /// The job was cancelled.
     pub fn trained(
         recipe: &Recipe,
+        done: Option<(usize, Self)>,
         lesson: impl Fn(usize) -> Lesson + Sync,
         job: &Job,
-        mut tell: impl FnMut(usize, f32, &Self),
+        mut tell: impl FnMut(usize, f32, &Self, bool),
     ) -> Result<Self, Cancelled> {
-        let mut reader = Self(Unet::untrained(shape(&recipe.levels), recipe.seed));
-        let mut optimiser = Optimiser::new(&reader.0);
-        let schedule = Schedule { rate: recipe.rate, steps: recipe.steps };
-        let cells = [recipe.crop / CELL; 2];
-        for step in 0..recipe.steps {
-            job.step(step, recipe.steps)?;
-            let learn = |i: usize| {
-                let key = Key::new(recipe.seed, 3 << 40 | (step * recipe.batch + i) as u64);
-                let number = (key.unit64(0) * recipe.lessons as f64) as usize;
-                let sample = Sample::drawn(&lesson(number), recipe.crop, key.split(1, 0))?;
-                let seen = sample.sight.cells([0, 0], cells);
-                Ok(reader.0.gradient(seen, |out| sample.loss(out, recipe.crack)))
-            };
-            let learnt: Vec<(f32, Vec<f32>)> =
-                (0..recipe.batch).into_par_iter().map(learn).collect::<Result<_, Cancelled>>()?;
-            let (loss, gradient) = mean(&learnt);
-            optimiser.step(&mut reader.0, &gradient, schedule.at(step), recipe.decay);
-            tell(step, loss, &reader);
+        let untrained = || Self(Unet::untrained(shape(&recipe.levels), recipe.seed));
+        let (done, mut reader) = done.unwrap_or_else(|| (0, untrained()));
+        let mut first: usize = recipe.stages.iter().take(done).map(|&(steps, _)| steps).sum();
+        for &(steps, rate) in recipe.stages.iter().skip(done) {
+            let mut optimiser = Optimiser::new(&reader.0);
+            let schedule = Schedule { rate, steps };
+            for step in 0..steps {
+                job.step(step, steps)?;
+                let (loss, gradient) = reader.learnt(recipe, first + step, &lesson)?;
+                optimiser.step(&mut reader.0, &gradient, schedule.at(step), recipe.decay);
+                tell(first + step, loss, &reader, step + 1 == steps);
+            }
+            first += steps;
         }
         Ok(reader)
+    }
+
+    /// The mean loss over the crops of a step, and its gradient.
+    fn learnt(
+        &self,
+        recipe: &Recipe,
+        step: usize,
+        lesson: impl Fn(usize) -> Lesson + Sync,
+    ) -> Result<(f32, Vec<f32>), Cancelled> {
+        let learn = |i: usize| {
+            let key = Key::new(recipe.seed, 3 << 40 | (step * recipe.batch + i) as u64);
+            let number = (key.unit64(0) * recipe.lessons_at(step) as f64) as usize;
+            let sample = Sample::drawn(&lesson(number), recipe.crop, key.split(1, 0))?;
+            let seen = sample.sight.cells([0, 0], [recipe.crop / CELL; 2]);
+            Ok(self.0.gradient(seen, |out| sample.loss(out, recipe.crack)))
+        };
+        let learnt: Vec<(f32, Vec<f32>)> =
+            (0..recipe.batch).into_par_iter().map(learn).collect::<Result<_, Cancelled>>()?;
+        Ok(mean(&learnt))
     }
 }
 
@@ -117,12 +140,11 @@ mod tests {
         Recipe {
             levels: vec![4, 8],
             lessons_seed: 9,
-            lessons: 2,
+            lessons: [1, 2],
             seed: 1,
-            steps: 4,
+            stages: vec![(3, 3e-3), (2, 1e-3)],
             batch: 3,
             crop: 64,
-            rate: 3e-3,
             decay: 1e-4,
             crack: 5.0,
         }
@@ -159,21 +181,27 @@ mod tests {
     }
 
     #[test]
-    fn training_repeats_to_the_bit_on_any_number_of_threads() {
+    fn training_repeats_to_the_bit_on_any_number_of_threads_and_wherever_it_goes_on() {
         let lessons: Vec<Lesson> =
             (0..2).map(|n| Lesson::render(9, n, &Job::default()).unwrap()).collect();
-        let trained = |threads: usize| {
+        let trained = |threads: usize, done: Option<(usize, Reader)>| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            let mut losses = Vec::new();
+            let (mut losses, mut stages) = (Vec::new(), Vec::new());
             let read = |n: usize| lessons[n].clone();
-            let reader = pool.install(|| {
-                Reader::trained(&recipe(), read, &Job::default(), |_, loss, _| losses.push(loss))
-            });
-            (reader.unwrap().to_bytes(), losses)
+            let tell = |_: usize, loss: f32, reader: &Reader, over: bool| {
+                losses.push(loss);
+                stages.extend(over.then(|| reader.clone()));
+            };
+            let job = Job::default();
+            let reader = pool.install(|| Reader::trained(&recipe(), done, read, &job, tell));
+            (reader.unwrap(), losses, stages)
         };
-        let ((one, losses), (three, again)) = (trained(1), trained(3));
-        assert_eq!(one, three);
-        assert_eq!(losses, again);
-        assert!(losses.iter().all(|l| l.is_finite()));
+        let (one, losses, stages) = trained(1, None);
+        let (three, again, _) = trained(3, None);
+        assert_eq!((&one, &losses), (&three, &again));
+        assert!(losses.len() == 5 && losses.iter().all(|l| l.is_finite()));
+        let (later, rest, _) = trained(2, Some((1, stages[0].clone())));
+        assert_eq!((&one, &losses[3..]), (&later, &rest[..]));
+        assert_ne!(stages[0], one);
     }
 }
