@@ -187,7 +187,7 @@ impl Network {
         let sections = sections(recipe.plan, recipe.slices, recipe.seed, job)?;
         let noise = Noise::new(recipe.plan, recipe.noises, recipe.seed, job)?;
         let mut network = Self(Unet::untrained(shape(recipe.base), recipe.seed));
-        let mut optimiser = Optimiser::new(&network.0);
+        let mut optimiser = Optimiser::new(network.0.weights().len());
         let schedule = Schedule { rate: recipe.rate, steps: recipe.steps };
         for step in 0..recipe.steps {
             job.step(step, recipe.steps)?;
@@ -202,7 +202,7 @@ impl Network {
             let learnt: Vec<(f32, Vec<f32>)> =
                 (0..recipe.batch).into_par_iter().map(learn).collect();
             let (loss, gradient) = mean(&learnt);
-            optimiser.step(&mut network.0, &gradient, schedule.at(step), recipe.decay);
+            optimiser.step(network.0.weights_mut(), &gradient, schedule.at(step), recipe.decay);
             tell(step, loss, &network);
         }
         Ok(network)

@@ -16,14 +16,17 @@ pub(super) fn taken(light: &Grid<Vec3>, key: Key) -> Grid<Vec3> {
     let mut roots = light.map(|l| l.max(Vec3::ZERO).map(f32::sqrt));
     expose(&mut roots, &mut draw);
     colour(&mut roots, &mut draw);
-    if draw.chance(0.45) {
-        roots = blurred(&roots, draw.between(0.35, 1.3));
+    // Most are sharp, some a little soft; some were enlarged by whoever kept them.
+    match draw.count(0, 9) {
+        0..=3 => {}
+        4..=7 => roots = blurred(&roots, draw.between(0.35, 1.3)),
+        _ => roots = blurred(&roots, draw.log_between(1.3, 4.0)),
     }
-    if draw.chance(0.6) {
+    if draw.chance(0.5) {
         haze(&mut roots, draw.log_between(0.05, 1.5) as f32);
     }
     if draw.chance(0.6) {
-        let strength = draw.log_between(0.02, 0.35) as f32;
+        let strength = draw.log_between(0.01, 0.25) as f32;
         texture(&mut roots, key.split(1, 0), draw.log_between(0.5, 4.0), strength);
     }
     if draw.chance(0.5) {

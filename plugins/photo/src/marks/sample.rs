@@ -35,7 +35,7 @@ impl Frame {
             0..=2 => 1.0,
             3..=6 => draw.log_between(smallest, 1.8) as f32,
             // As one sees who comes close: cracks a dozen pixels wide, with soft borders.
-            _ => draw.log_between(1.8, 3.5) as f32,
+            _ => draw.log_between(1.8, 4.5) as f32,
         };
         let room = (lesson as f32 - side as f32 / zoom).max(0.0);
         let mut place = || 0.5 * lesson as f32 + room * (draw.unit() as f32 - 0.5);
@@ -137,7 +137,7 @@ impl Sample {
                 course.data[i] = true;
             }
         }
-        let seen = seen(&course, grey);
+        let seen = seen(&course, &wide, grey);
         self.truth.data.iter_mut().for_each(|t| t[0] = 0.0);
         let near = |i: usize, reach: i32| {
             let (x, y) = ((i % width) as i32, (i / width) as i32);
@@ -194,10 +194,10 @@ fn pixel(at: Vec2, grid: &Grid<f32>) -> Option<usize> {
 const FAINTEST: f32 = 0.55;
 /// Half sides of the squares over which a line's tone and that of its surroundings are averaged.
 const LINE: usize = 7;
-const AROUND: usize = 9;
+const AROUND: usize = 14;
 
 /// Where a course is to be seen: its tone, averaged along it, against what is around it.
-fn seen(course: &Grid<bool>, grey: &Grid<f32>) -> Grid<bool> {
+fn seen(course: &Grid<bool>, wide: &Grid<bool>, grey: &Grid<f32>) -> Grid<bool> {
     let number = |mask: &Grid<bool>| mask.map(|m| f64::from(u8::from(m)));
     let times = |a: &Grid<f64>, b: &Grid<f64>| -> Grid<f64> {
         let data = a.data.iter().zip(&b.data).map(|(a, b)| a * b).collect();
@@ -205,7 +205,9 @@ fn seen(course: &Grid<bool>, grey: &Grid<f32>) -> Grid<bool> {
     };
     let tone = grey.map(f64::from);
     let on = number(course);
-    let near = boxed(&on, 2);
+    let mut near = boxed(&on, 2);
+    let lips = boxed(&number(wide), 2);
+    near.data.iter_mut().zip(&lips.data).for_each(|(n, w)| *n += w);
     let off = near.map(|n| if n > 0.5 { 0.0 } else { 1.0 });
     let [line, lines] = [boxed(&times(&tone, &on), LINE), boxed(&on, LINE)];
     let plain = times(&tone, &off);
@@ -213,7 +215,11 @@ fn seen(course: &Grid<bool>, grey: &Grid<f32>) -> Grid<bool> {
         [boxed(&plain, AROUND), boxed(&times(&plain, &tone), AROUND), boxed(&off, AROUND)];
     let mut seen = course.clone();
     for i in course.pixels() {
-        let n = count.data[i].max(1.0);
+        let n = count.data[i];
+        if n < 20.0 {
+            // Nothing but crack all around.
+            continue;
+        }
         let mean = sum.data[i] / n;
         let scatter = (squares.data[i] / n - mean * mean).max(0.0).sqrt() + 0.006 * mean;
         let depth = mean - line.data[i] / lines.data[i].max(1.0);

@@ -16,6 +16,9 @@ pub(super) const PIXELS: usize = CELL * CELL;
 const MEAN: f64 = 16.0;
 /// Reach of the deviation that detail is measured by, pixels.
 const DEVIATION: f64 = 24.0;
+/// Reach of the mean that tone and hue are, pixels. They tell what a place is like; finer ones
+/// would let the network know cracks by their colour, which files blur and cameras make up.
+const BROAD: f64 = 4.0;
 /// Deviation below which nothing is detail, as a share of the tone around.
 const SMOOTHEST: f32 = 0.01;
 /// No detail is stronger, in deviations.
@@ -56,8 +59,11 @@ impl Sight {
         let square = blurred(&detail.map(|d| d * d), DEVIATION)?;
         let scale = each(&square, &around, |s, a| s.max(0.0).sqrt() + SMOOTHEST * a + 1e-6 * mean);
         let detail = each(&detail, &scale, |d, s| (d / s).clamp(-STRONGEST, STRONGEST));
-        let tone = tone.map(|t| (2.0 * (t / mean - 1.0)).clamp(-FURTHEST, FURTHEST));
+        let tone = blurred(&tone, BROAD)?.map(|t| 2.0 * (t / mean - 1.0));
         let [red, blue] = [Vec3::X, Vec3::Z].map(|channel| hue(light, known, channel, mean * mean));
+        let (red, blue) = (blurred(&red, BROAD)?, blurred(&blue, BROAD)?);
+        let bounded = |grid: Grid<f32>| grid.map(|v| v.clamp(-FURTHEST, FURTHEST));
+        let [tone, red, blue] = [tone, red, blue].map(bounded);
         let mut planes = [detail, tone, red, blue];
         if !whole {
             for plane in &mut planes {
@@ -108,5 +114,5 @@ fn hue(light: &Grid<Vec3>, known: &Mask, channel: Vec3, level: f32) -> Grid<f32>
     let ratio = light.map(|l| ((l.dot(channel).max(0.0) + floor) / (l.y.max(0.0) + floor)).ln());
     let of_known = ratio.data.iter().zip(&known.data).filter(|(_, k)| **k);
     let mean = of_known.map(|(&r, _)| f64::from(r)).sum::<f64>() / known.count().max(1) as f64;
-    ratio.map(|r| (4.0 * (r - mean as f32)).clamp(-FURTHEST, FURTHEST))
+    ratio.map(|r| 4.0 * (r - mean as f32))
 }

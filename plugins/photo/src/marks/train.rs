@@ -1,7 +1,7 @@
 //! Training on lessons: cross entropy of every kind of damage, soft Dice of cracks and of missing
 //! cover.
 
-use intrados_raster::network::{Optimiser, Planes, Schedule, Unet, mean};
+use intrados_raster::network::{Optimiser, Planes, Schedule, Standardised, mean};
 use intrados_stage::{Cancelled, Job, random::Key};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -17,13 +17,14 @@ pub struct Recipe {
     pub levels: Vec<usize>,
     /// Seed of the lessons.
     pub lessons_seed: u64,
-    /// Rendered lessons that crops are drawn from at the beginning and at the end of the first
-    /// stage; their number grows evenly, so that training can begin while they are rendered.
-    pub lessons: [usize; 2],
+    /// Rendered lessons.
+    pub lessons: usize,
     /// Seed of everything else.
     pub seed: u64,
-    /// Steps of the optimiser and its highest rate, stage by stage: each warms up and cools down.
-    pub stages: Vec<(usize, f32)>,
+    /// Steps of the optimiser.
+    pub steps: usize,
+    /// Its highest rate.
+    pub rate: f32,
     /// Crops a step.
     pub batch: usize,
     /// Edge of a crop, pixels, a multiple of 16.
@@ -32,14 +33,6 @@ pub struct Recipe {
     pub decay: f32,
     /// How often a crack's pixel counts in the cross entropy.
     pub crack: f32,
-}
-
-impl Recipe {
-    fn lessons_at(&self, step: usize) -> usize {
-        let [first, last] = self.lessons;
-        let growing = self.stages.first().map_or(1, |&(steps, _)| steps.max(1));
-        first + last.saturating_sub(first) * step.min(growing) / growing
-    }
 }
 
 /// How much the cross entropy of each kind counts.
@@ -82,34 +75,30 @@ impl Sample {
 }
 
 impl Reader {
-    /// Trains a network on the lessons that `lesson` reads; `tell` hears each step, its loss, and
-    /// whether a stage is over. It goes on after so many stages `done`, with the weights that they
-    /// gave. The same bits for any number of threads, and wherever it goes on.
+    /// Trains a network on the lessons that `lesson` reads; `tell` hears each step, its loss and
+    /// the network before it. The same bits for any number of threads.
     ///
     /// # Errors
     /// The job was cancelled.
     pub fn trained(
         recipe: &Recipe,
-        done: Option<(usize, Self)>,
         lesson: impl Fn(usize) -> Lesson + Sync,
         job: &Job,
-        mut tell: impl FnMut(usize, f32, &Self, bool),
+        mut tell: impl FnMut(usize, f32, &Self),
     ) -> Result<Self, Cancelled> {
-        let untrained = || Self(Unet::untrained(shape(&recipe.levels), recipe.seed));
-        let (done, mut reader) = done.unwrap_or_else(|| (0, untrained()));
-        let mut first: usize = recipe.stages.iter().take(done).map(|&(steps, _)| steps).sum();
-        for &(steps, rate) in recipe.stages.iter().skip(done) {
-            let mut optimiser = Optimiser::new(&reader.0);
-            let schedule = Schedule { rate, steps };
-            for step in 0..steps {
-                job.step(step, steps)?;
-                let (loss, gradient) = reader.learnt(recipe, first + step, &lesson)?;
-                optimiser.step(&mut reader.0, &gradient, schedule.at(step), recipe.decay);
-                tell(first + step, loss, &reader, step + 1 == steps);
-            }
-            first += steps;
+        let mut training = Standardised::new(shape(&recipe.levels), recipe.seed);
+        let mut optimiser = Optimiser::new(training.parameters().len());
+        let schedule = Schedule { rate: recipe.rate, steps: recipe.steps };
+        for step in 0..recipe.steps {
+            job.step(step, recipe.steps)?;
+            let reader = Self(training.network());
+            let (loss, by_weights) = reader.learnt(recipe, step, &lesson)?;
+            let gradient = training.gradient(&by_weights);
+            let rate = schedule.at(step);
+            optimiser.step(training.parameters_mut(), &gradient, rate, recipe.decay);
+            tell(step, loss, &reader);
         }
-        Ok(reader)
+        Ok(Self(training.network()))
     }
 
     /// The mean loss over the crops of a step, and its gradient.
@@ -121,7 +110,7 @@ impl Reader {
     ) -> Result<(f32, Vec<f32>), Cancelled> {
         let learn = |i: usize| {
             let key = Key::new(recipe.seed, 3 << 40 | (step * recipe.batch + i) as u64);
-            let number = (key.unit64(0) * recipe.lessons_at(step) as f64) as usize;
+            let number = (key.unit64(0) * recipe.lessons as f64) as usize;
             let sample = Sample::drawn(&lesson(number), recipe.crop, key.split(1, 0))?;
             let seen = sample.sight.cells([0, 0], [recipe.crop / CELL; 2]);
             Ok(self.0.gradient(seen, |out| sample.loss(out, recipe.crack)))
@@ -140,9 +129,10 @@ mod tests {
         Recipe {
             levels: vec![4, 8],
             lessons_seed: 9,
-            lessons: [1, 2],
+            lessons: 2,
             seed: 1,
-            stages: vec![(3, 3e-3), (2, 1e-3)],
+            steps: 4,
+            rate: 3e-3,
             batch: 3,
             crop: 64,
             decay: 1e-4,
@@ -181,27 +171,20 @@ mod tests {
     }
 
     #[test]
-    fn training_repeats_to_the_bit_on_any_number_of_threads_and_wherever_it_goes_on() {
+    fn training_repeats_to_the_bit_on_any_number_of_threads() {
         let lessons: Vec<Lesson> =
             (0..2).map(|n| Lesson::render(9, n, &Job::default()).unwrap()).collect();
-        let trained = |threads: usize, done: Option<(usize, Reader)>| {
+        let trained = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            let (mut losses, mut stages) = (Vec::new(), Vec::new());
+            let mut losses = Vec::new();
             let read = |n: usize| lessons[n].clone();
-            let tell = |_: usize, loss: f32, reader: &Reader, over: bool| {
-                losses.push(loss);
-                stages.extend(over.then(|| reader.clone()));
-            };
-            let job = Job::default();
-            let reader = pool.install(|| Reader::trained(&recipe(), done, read, &job, tell));
-            (reader.unwrap(), losses, stages)
+            let tell = |_: usize, loss: f32, _: &Reader| losses.push(loss);
+            let reader =
+                pool.install(|| Reader::trained(&recipe(), read, &Job::default(), tell)).unwrap();
+            (reader, losses)
         };
-        let (one, losses, stages) = trained(1, None);
-        let (three, again, _) = trained(3, None);
-        assert_eq!((&one, &losses), (&three, &again));
-        assert!(losses.len() == 5 && losses.iter().all(|l| l.is_finite()));
-        let (later, rest, _) = trained(2, Some((1, stages[0].clone())));
-        assert_eq!((&one, &losses[3..]), (&later, &rest[..]));
-        assert_ne!(stages[0], one);
+        let (one, losses) = trained(1);
+        assert_eq!((&one, &losses), (&trained(3).0, &trained(2).1));
+        assert!(losses.len() == 4 && losses.iter().all(|l| l.is_finite()));
     }
 }

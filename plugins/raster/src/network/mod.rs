@@ -6,6 +6,7 @@
 //! they are trained on is the business of whoever uses it.
 
 mod planes;
+mod standard;
 mod train;
 
 use std::ops::Range;
@@ -13,6 +14,7 @@ use std::ops::Range;
 use intrados_stage::{Cancelled, Job, random::Key};
 
 pub use planes::{BLOCK, Planes, Spare};
+pub use standard::Standardised;
 pub use train::{Optimiser, Schedule, mean};
 
 use planes::{TAPS, adjoint};

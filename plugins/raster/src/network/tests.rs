@@ -64,7 +64,7 @@ fn trained(threads: usize) -> (Vec<f32>, Unet) {
     pool.install(|| {
         let shape = Shape { inputs: 2, levels: vec![4, 8], outputs: 4 };
         let mut network = Unet::untrained(shape, 1);
-        let mut optimiser = Optimiser::new(&network);
+        let mut optimiser = Optimiser::new(network.weights().len());
         let schedule = Schedule { rate: 3e-3, steps: 80 };
         let lesson = |i: u64| drawn(2, 16, 16, Key::new(i % 3, 1));
         let losses = (0..80).map(|step| {
@@ -74,7 +74,7 @@ fn trained(threads: usize) -> (Vec<f32>, Unet) {
             };
             let learnt: Vec<_> = (0..6_u64).into_par_iter().map(learn).collect();
             let (loss, gradient) = mean(&learnt);
-            optimiser.step(&mut network, &gradient, schedule.at(step), 1e-4);
+            optimiser.step(network.weights_mut(), &gradient, schedule.at(step), 1e-4);
             loss
         });
         (losses.collect(), network)
@@ -115,4 +115,35 @@ fn looking_and_learning_see_the_same() {
         assert_eq!(*out, first);
         (0.0, out.clone())
     });
+}
+
+/// The gradient through standardised weights, of weights, biases and gains of all layers.
+#[test]
+fn standardised_gradient_equals_differences() {
+    let shape = Shape { inputs: 3, levels: vec![4, 8], outputs: 4 };
+    let seen = drawn(3, 24, 16, Key::new(5, 0));
+    let wanted = drawn(4, 24, 16, Key::new(6, 0));
+    let mut trained = Standardised::new(shape, 3);
+    let loss = |trained: &Standardised| {
+        trained.network().gradient(seen.clone(), |out| squares(out, &wanted))
+    };
+    let learnt = trained.gradient(&loss(&trained).1);
+    assert_eq!(learnt.len(), trained.parameters().len());
+    let count = trained.parameters().len();
+    for part in 0..16 {
+        let range = part * count / 16..(part + 1) * count / 16;
+        let at = range.max_by(|&a, &b| learnt[a].abs().total_cmp(&learnt[b].abs())).unwrap();
+        let (old, step) = (trained.parameters()[at], 3e-4);
+        let sides = [old + step, old - step].map(|v| {
+            trained.parameters_mut()[at] = v;
+            loss(&trained).0
+        });
+        trained.parameters_mut()[at] = old;
+        let difference = (sides[0] - sides[1]) / (2.0 * step);
+        assert!(
+            (difference - learnt[at]).abs() < 0.05 * learnt[at].abs() + 1e-3,
+            "parameter {at}: {difference} and {}",
+            learnt[at]
+        );
+    }
 }

@@ -1,8 +1,6 @@
 //! What changes the weights: AdamW (Loshchilov and Hutter 2019) with clipped gradients, a rate that
 //! warms up and cools down.
 
-use super::Unet;
-
 /// AdamW with clipped gradients.
 #[derive(Debug, Clone)]
 pub struct Optimiser {
@@ -12,26 +10,22 @@ pub struct Optimiser {
 }
 
 impl Optimiser {
-    /// One that has not seen a gradient yet.
+    /// One of so many weights that has not seen a gradient yet.
     #[must_use]
-    pub fn new(network: &Unet) -> Self {
-        let none = vec![0.0; network.weights().len()];
+    pub fn new(count: usize) -> Self {
+        let none = vec![0.0; count];
         Self { means: none.clone(), squares: none, steps: 0 }
     }
 
     /// One step down the gradient.
-    pub fn step(&mut self, network: &mut Unet, gradient: &[f32], rate: f32, decay: f32) {
+    pub fn step(&mut self, weights: &mut [f32], gradient: &[f32], rate: f32, decay: f32) {
         const BETA: [f32; 2] = [0.9, 0.999];
         self.steps += 1;
         let length = gradient.iter().map(|g| f64::from(*g).powi(2)).sum::<f64>().sqrt() as f32;
         let clip = 1.0 / length.max(1.0);
         let [a, b] = BETA.map(|b| 1.0 - b.powi(self.steps));
-        for (((w, g), m), s) in network
-            .weights_mut()
-            .iter_mut()
-            .zip(gradient)
-            .zip(&mut self.means)
-            .zip(&mut self.squares)
+        for (((w, g), m), s) in
+            weights.iter_mut().zip(gradient).zip(&mut self.means).zip(&mut self.squares)
         {
             let g = g * clip;
             *m = BETA[0] * *m + (1.0 - BETA[0]) * g;
