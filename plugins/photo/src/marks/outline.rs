@@ -14,7 +14,7 @@ pub(super) struct Threshold {
 }
 
 /// Of cracks: one choice for all photographs.
-pub(super) const CRACKS: Threshold = Threshold { low: 0.7, high: 0.97, length: 40.0 };
+pub(super) const CRACKS: Threshold = Threshold { low: 0.65, high: 0.8, length: 60.0 };
 
 /// Of areas.
 const AREA: f32 = 0.5;
