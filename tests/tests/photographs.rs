@@ -54,7 +54,8 @@ fn photograph(folder: &Path) {
     let lit = LitScene::build(Arc::new(damaged), &job).unwrap();
     let settings = RenderSettings {
         sides: Sides::Primal,
-        samples: Some(24),
+        // As little grain as a camera leaves.
+        samples: Some(128),
         seed: 5,
         ..RenderSettings::default()
     };
