@@ -19,11 +19,11 @@ fn main() {
     let (mut sum, begin) = (0.0, cpu_seconds());
     let tell = |step: usize, loss: f32, reader: &Reader| {
         sum += loss;
-        if (step + 1) % 50 == 0 {
+        if (step + 1).is_multiple_of(50) {
             println!("{}: {:.4}, {:.0} CPU-s", step + 1, sum / 50.0, cpu_seconds() - begin);
             sum = 0.0;
         }
-        if (step + 1) % 500 == 0 {
+        if (step + 1).is_multiple_of(500) {
             let beside = out.with_extension(format!("{}.f32", step + 1));
             std::fs::write(beside, reader.to_bytes()).unwrap();
         }
