@@ -35,7 +35,7 @@ fn scene(truth: &str) -> String {
     )],
     lamps: [
         Environment(name: "sky", radiance: (1, 1, 1)),
-        Directional(name: "sun", direction: (-0.5, -0.6, -0.6), irradiance: (2, 1.9, 1.7)),
+        Directional(name: "sun", direction: (-0.5, -0.6, -0.6), strength: WattPerSquareMetre(2), colour: (1, 0.95, 0.85)),
     ],
     cameras: [(name: "shot", position: (0.3, 0.5, 1.15), target: (0.03, 0.3, 0.1), fov_deg: 42, width: 800, height: 800, exposure: 0)],
 )"#

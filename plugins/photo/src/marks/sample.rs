@@ -284,8 +284,8 @@ mod tests {
             (cracks, spared)
         };
         let ((clear, unclear), (none, faint)) = (count(0.4), count(0.0));
-        // Some are taken through haze and texture, or from so close that the line is outside.
-        assert!(clear > 20 * 3 * 60 && unclear < clear / 5, "{clear} {unclear}");
+        // Haze, blur and noise hide some of them.
+        assert!(clear > 20 * 3 * 75 && unclear < clear / 5, "{clear} {unclear}");
         assert!(faint > 20 * 5 * 100 && none < faint / 10, "{none} {faint}");
     }
 

@@ -67,7 +67,7 @@ fn f1([hits, found, met, wanted]: [usize; 4]) -> f64 {
 /// found, narrower ones may be. The other kinds are not held to anything: the weights hardly know
 /// them (see the README).
 #[test]
-fn damage_is_found_in_pictures_that_training_did_not_see() {
+fn cracks_are_found_in_pictures_that_training_did_not_see() {
     let mut cracks = [0; 4];
     for number in 0..60 {
         let lesson = fresh(number);

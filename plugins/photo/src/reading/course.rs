@@ -34,7 +34,7 @@ impl Line {
     /// Pixels from end to end, along the line.
     pub(super) fn length(&self) -> f64 {
         let step = |w: &[[f64; 2]]| (w[1][0] - w[0][0]).hypot(w[1][1] - w[0][1]);
-        self.points.windows(2).map(|w| step(w)).sum()
+        self.points.windows(2).map(step).sum()
     }
 }
 
