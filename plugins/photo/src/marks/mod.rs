@@ -83,7 +83,8 @@ impl Marks {
         outline::lines(self.of(Mark::Crack), outline::CRACKS)
     }
 
-    /// Where there is damage of a kind.
+    /// Where there is damage of a kind. With the carried weights missing cover, steel and
+    /// efflorescence are never probable enough, and rust seldom: only cracks are read so far.
     #[must_use]
     pub fn areas(&self, mark: Mark) -> Mask {
         match mark {

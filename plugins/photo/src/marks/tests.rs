@@ -64,10 +64,11 @@ fn f1([hits, found, met, wanted]: [usize; 4]) -> f64 {
 }
 
 /// The carried weights on rendered pictures of another seed: cracks of at least a pixel are to be
-/// found, narrower ones may be. Missing cover pixel by pixel is told, and not found yet.
+/// found, narrower ones may be. The other kinds are not held to anything: the weights hardly know
+/// them (see the README).
 #[test]
 fn cracks_are_found_in_pictures_that_training_did_not_see() {
-    let (mut cracks, mut spalls) = ([0; 4], [0; 4]);
+    let mut cracks = [0; 4];
     for number in 0..60 {
         let lesson = fresh(number);
         let marks = read(&lesson);
@@ -89,11 +90,7 @@ fn cracks_are_found_in_pictures_that_training_did_not_see() {
         let found = marks.cracks();
         let counts = [near(&found, &all), found.count(), near(&clear, &found), clear.count()];
         cracks = std::array::from_fn(|k| cracks[k] + counts[k]);
-        let found = marks.areas(Mark::Spall);
-        let both = found.data.iter().zip(&spall.data).filter(|(f, s)| **f && **s).count();
-        let counts = [both, found.count(), both, spall.count()];
-        spalls = std::array::from_fn(|k| spalls[k] + counts[k]);
     }
-    println!("cracks {:.3}, missing cover {:.3}", f1(cracks), f1(spalls));
-    assert!(f1(cracks) > 0.5, "{cracks:?}");
+    println!("cracks {:.3}", f1(cracks));
+    assert!(f1(cracks) > 0.6, "{cracks:?}");
 }
