@@ -1,13 +1,12 @@
 //! What can go wrong, and the exit code that says so.
 
 use intrados_ct::SliceError;
-use intrados_damage::predict::PredictError;
 use intrados_experiments::ExperimentError;
 use intrados_photo::{map::MapError, picks::PicksError, series::SeriesError};
+use intrados_predict::PredictError;
 use intrados_report::RecordError;
 use intrados_scene::{ErrorKind, LoadError, attach::AttachError, gltf::ImportError, import};
-use intrados_stage::file::WriteError;
-use intrados_stage::{Cancelled, access::Denied};
+use intrados_stage::{Cancelled, access::Denied, file::WriteError};
 use intrados_xray::{recon::ReconError, scan::ScanError, volume::VolumeError};
 
 /// Why a command did not do its work. One line each.

@@ -36,7 +36,7 @@ use std::{process::ExitCode, sync::Arc};
 use bevy_app::App;
 use clap::Parser;
 use intrados_ct::detect::{self, Method};
-use intrados_damage::predict::PredictSettings;
+use intrados_predict::PredictSettings;
 
 /// Runs the program for the arguments of this process. `build` makes the [`App`] that it works
 /// with: [`simulation`] and whatever else plugins bring.
@@ -64,7 +64,7 @@ pub fn simulation() -> App {
         intrados_light::LightPlugin::default(),
         intrados_mechanics::MechanicsPlugin,
         intrados_xray::XrayPlugin,
-        intrados_damage::DamagePlugin { settings: predicting() },
+        intrados_predict::PredictPlugin { settings: predicting() },
     ));
     app
 }

@@ -5,11 +5,11 @@
 use glam::Vec3;
 use intrados_ct::synthetic::drawn;
 use intrados_damage::{
-    Cause, Evidence, EvidenceSource, PredictError, Said, Sources,
-    grading::NO_EVIDENCE,
-    predict::{PredictSettings, predict},
-    verdict::Basis,
+    Cause, Evidence, EvidenceSource, Said, Sources, grading::NO_EVIDENCE, verdict::Basis,
     zone::Zones,
+};
+use intrados_predict::{
+    PredictError, PredictPlugin, PredictSettings, Predicted, Progress, predict,
 };
 use intrados_scene::{Damage, Frame, Member, MemberKind, Scene, Slices};
 use intrados_stage::{Estimate, Job};
@@ -222,7 +222,7 @@ fn the_plugin_predicts_what_the_function_predicts() {
     use bevy_app::App;
     use bevy_ecs::prelude::{Entity, With};
 
-    use intrados_damage::{AddEvidence, DamagePlugin, Predicted, Progress};
+    use intrados_damage::AddEvidence;
     use intrados_scene::{ScenePlugin, plugin::SceneIndex};
     use intrados_stage::{Pace, StagePlugin};
     let mut scene = scene();
@@ -231,7 +231,7 @@ fn the_plugin_predicts_what_the_function_predicts() {
         predict(&scene, PredictSettings::default(), &Sources::default(), &Job::default()).unwrap();
     for pace in [Pace::Passes(3), Pace::Within(std::time::Duration::from_millis(5))] {
         let mut app = App::new();
-        app.add_plugins((StagePlugin, ScenePlugin, DamagePlugin::default())).insert_resource(pace);
+        app.add_plugins((StagePlugin, ScenePlugin, PredictPlugin::default())).insert_resource(pace);
         intrados_scene::plugin::install(app.world_mut(), scene.clone());
         let mut members = app.world_mut().query_filtered::<(Entity, &SceneIndex), With<Member>>();
         let mut entities: Vec<_> =
@@ -250,7 +250,7 @@ fn the_plugin_predicts_what_the_function_predicts() {
     }
     // Another plugin's evidence is a piece of the same queue: it joins, and contradicts.
     let mut app = App::new();
-    app.add_plugins((StagePlugin, ScenePlugin, DamagePlugin::default()))
+    app.add_plugins((StagePlugin, ScenePlugin, PredictPlugin::default()))
         .add_evidence(Knocked)
         .insert_resource(Pace::Passes(9));
     intrados_scene::plugin::install(app.world_mut(), scene);
@@ -278,7 +278,7 @@ impl EvidenceSource for Knocked {
         if index == 0 { vec!["three knocks".into()] } else { Vec::new() }
     }
 
-    fn evidence(&self, _: &Scene, _: usize, _: &Job) -> Result<Said, PredictError> {
+    fn evidence(&self, _: &Scene, _: usize, _: &Job) -> Result<Said, EvidenceError> {
         let zones = Zones::all(Estimate { value: 0.7, std_error: 0.05 });
         let evidence =
             Evidence::new(self.name(), true, [(Cause::Concrete, zones)].into(), String::new());

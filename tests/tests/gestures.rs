@@ -10,9 +10,10 @@ use egui::{
     pos2, vec2,
 };
 use egui_kittest::{Harness, kittest::Queryable};
-use intrados_damage::{DamagePlugin, predict};
 use intrados_light::{LightPlugin, Render};
 use intrados_panels::{Action, Actions, Banners, PanelsPlugin, Window};
+use intrados_predict as predict;
+use intrados_predict::PredictPlugin;
 use intrados_scene::{Member, Scene, plugin::install};
 use intrados_stage::{Job, Jobs, Pace, random::Key as Random};
 use intrados_transport::{BATCH, Schedule};
@@ -41,7 +42,7 @@ fn build() -> App {
         LightPlugin::default(),
         intrados_mechanics::MechanicsPlugin,
         intrados_xray::XrayPlugin,
-        DamagePlugin {
+        PredictPlugin {
             settings: predict::PredictSettings {
                 forecast: None,
                 ..predict::PredictSettings::default()

@@ -5,14 +5,12 @@
 
 use std::{fs, path::Path, sync::Arc};
 
-use intrados_damage::{
-    Prediction, Sources,
-    photographed::PHOTOGRAPHED,
-    predict::{PredictSettings, predict},
-};
+use intrados_damage::Sources;
 use intrados_light::{LitScene, Render, RenderSettings, Sides, View};
+use intrados_predict::{PredictSettings, Prediction, predict};
 use intrados_scene::Scene;
 use intrados_stage::Job;
+use intrados_survey::photographed::PHOTOGRAPHED;
 
 const WIDTH_MM: f64 = 0.8;
 const ALONG: f64 = 0.6;

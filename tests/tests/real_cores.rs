@@ -2,10 +2,8 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-use intrados_damage::{
-    Sources,
-    predict::{PredictSettings, predict},
-};
+use intrados_damage::Sources;
+use intrados_predict::{PredictSettings, predict};
 use intrados_scene::Scene;
 use intrados_stage::Job;
 

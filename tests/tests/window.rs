@@ -10,24 +10,26 @@ use egui_kittest::{
     kittest::{NodeT, Queryable},
 };
 use glam::Vec3;
-use intrados_damage::{Progress, Sources, predict};
+use intrados_damage::Sources;
 use intrados_light::{
     Render, RenderSettings, View,
     plugin::{ActiveCamera, Learning, Lit, MeasureSettings},
 };
 use intrados_mechanics::{
     member::Meshing,
-    plugin::{Analyses, Analyze, State},
+    plugin::{Analyses, Analyze},
 };
 use intrados_panels::{
     Action, Actions, AddPanel, Latest, Log, Look, PanelsPlugin, Place, Quantity, Refine, Selection,
     Statistics, Viewpoint, show,
 };
+use intrados_predict as predict;
+use intrados_predict::Progress;
 use intrados_scene::{CrackSurface, Member, Mouth, SurfaceDamage, plugin::CurrentScene};
-use intrados_stage::{Job, Jobs, Pace};
+use intrados_stage::{Job, Jobs, Pace, Work};
 use intrados_transport::{BATCH, Schedule, Side, Steering};
 use intrados_xray::{
-    plugin::{Scans, State as ScanState, StopScan, TakeScan},
+    plugin::{Scans, StopScan, TakeScan},
     scan::Corrections,
 };
 
@@ -640,7 +642,7 @@ fn a_member_is_analysed_and_shown() {
     assert!(window.harness.query_by_label_contains("Select a member").is_some());
     stress_of(&mut window, 0, 0.2);
     window.until("an outcome", |w| {
-        w.resource::<Analyses>().get("C1").is_some_and(|a| matches!(a.state, State::Done(_)))
+        w.resource::<Analyses>().get("C1").is_some_and(|a| matches!(a.work, Work::Done(_)))
     });
     window.frames(2);
     let pictures = |window: &Window| {
@@ -698,7 +700,7 @@ fn an_analysis_can_be_stopped() {
     window.until("its end", |w| !w.resource::<Analyses>().is_busy());
     assert!(window.with(|w| matches!(
         w.resource::<Analyses>().get("C1").map(|a| &a.state),
-        Some(State::Cancelled)
+        Some(Work::Cancelled)
     )));
 }
 
@@ -787,8 +789,7 @@ fn a_member_is_scanned_and_restored_again() {
     let mut forming = false;
     window.until("a scan", |w| {
         let scan = w.resource::<Scans>().get("C1");
-        forming |= scan
-            .is_some_and(|s| matches!(s.state, ScanState::Running(_)) && !s.sinogram.is_empty());
+        forming |= scan.is_some_and(|s| s.work.is_running() && !s.sinogram.is_empty());
         scan.is_some_and(|s| s.done().is_some())
     });
     assert!(forming, "nobody could have seen the sinogram form");
@@ -805,7 +806,7 @@ fn a_member_is_scanned_and_restored_again() {
     window.click("hardening");
     window.until(
         "other slices",
-        |w| matches!(w.resource::<Scans>().get("C1").map(|s| &s.state), Some(ScanState::Done(d)) if !d.corrections.hardening),
+        |w| matches!(w.resource::<Scans>().get("C1").map(|s| &s.work), Some(Work::Done(d)) if !d.corrections.hardening),
     );
     let again = window.with(|w| {
         w.resource::<Scans>()
@@ -836,7 +837,7 @@ fn a_scan_can_be_stopped() {
     window.until("its beginning", |w| w.resource::<Scans>().is_busy());
     window.with(|w| w.write_message(StopScan("C1".into())));
     window.until("its end", |w| {
-        matches!(w.resource::<Scans>().get("C1").map(|s| &s.state), Some(ScanState::Cancelled))
+        matches!(w.resource::<Scans>().get("C1").map(|s| &s.work), Some(Work::Cancelled))
     });
 }
 

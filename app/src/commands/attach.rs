@@ -3,12 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use intrados_ct::{Picture, source::SliceSource};
-use intrados_damage::photographed::{self, PhotoError};
 use intrados_photo::Photograph;
 use intrados_scene::{
     attach::{Attachment, Cut, Finding, Listed, Project, Proposal, Raw, What},
     structure::{Course, Electrode},
 };
+use intrados_survey::photographed::{self, PhotoError};
 use serde::Serialize;
 
 use super::detach::{known_as, rows};

@@ -5,12 +5,12 @@ use std::{ffi::OsString, path::Path, sync::Arc, time::Duration};
 use bevy_app::App;
 use intrados_ct::detect;
 use intrados_damage::{
-    Predicting, Prediction, Progress, forecast,
     grading::{Profile, ProfileError},
     ledger::Group,
-    predict::PredictSettings,
 };
+use intrados_forecast as forecast;
 use intrados_light::{LitScene, plugin::Lit};
+use intrados_predict::{PredictSettings, Predicting, Prediction, Progress};
 use intrados_report::{Document, Record, check_model};
 use intrados_scene::{Scene, plugin::install};
 use intrados_stage::{Jobs, Pace};

@@ -2,10 +2,8 @@
 
 use std::path::Path;
 
-use intrados_damage::{
-    ledger,
-    predict::{doubted, foreseen},
-};
+use intrados_damage::ledger;
+use intrados_predict::{doubted, foreseen};
 use intrados_scene::{ErrorKind, Problem, Scene, Severity, gltf};
 use serde::Serialize;
 

@@ -3,10 +3,7 @@
 use std::collections::BTreeMap;
 
 use bevy_app::{App, Plugin};
-use intrados_damage::{
-    AddEvidence, Cause, Evidence, EvidenceSource, PredictError, Said,
-    zone::{ZONES, Zones, zone_at},
-};
+use intrados_damage::{AddEvidence, Cause, Evidence, EvidenceSource, EvidenceError, Said, zone::{ZONES, Zones, zone_at}};
 use intrados_scene::Scene;
 use intrados_stage::{Estimate, Job, access};
 use serde::Deserialize;
@@ -76,12 +73,12 @@ struct ReboundHammer;
 
 impl ReboundHammer {
     /// All places of the table; none where there is no table.
-    fn places(scene: &Scene) -> Result<Vec<Place>, PredictError> {
+    fn places(scene: &Scene) -> Result<Vec<Place>, EvidenceError> {
         let path = scene.path.with_file_name(TABLE);
         if !path.exists() {
             return Ok(Vec::new());
         }
-        let refused = |why: String| PredictError::Refused(format!("{}: {why}", path.display()));
+        let refused = |why: String| EvidenceError::Refused(format!("{}: {why}", path.display()));
         let bytes = access::read(&path, MOST).map_err(|e| refused(e.to_string()))?;
         let mut places = Vec::new();
         for (row, place) in csv::Reader::from_reader(&bytes[..]).deserialize().enumerate() {
@@ -113,7 +110,7 @@ impl EvidenceSource for ReboundHammer {
         }
     }
 
-    fn evidence(&self, scene: &Scene, index: usize, _: &Job) -> Result<Said, PredictError> {
+    fn evidence(&self, scene: &Scene, index: usize, _: &Job) -> Result<Said, EvidenceError> {
         let mut zones = Zones([None; ZONES]);
         for place in Self::places(scene)?.iter().filter(|p| p.member == scene.members[index].id) {
             let (now, before) = (place.damage(), &mut zones.0[zone_at(place.along)]);

@@ -199,7 +199,7 @@ pub trait EvidenceSource: fmt::Debug + Send + Sync {
     ///
     /// # Errors
     /// None of the items can be used, and why; or the job was cancelled.
-    fn evidence(&self, scene: &Scene, index: usize, job: &Job) -> Result<Said, PredictError>;
+    fn evidence(&self, scene: &Scene, index: usize, job: &Job) -> Result<Said, EvidenceError>;
 }
 
 /// All sources of evidence but the program's own.

@@ -1,11 +1,10 @@
 //! From what is seen in a section to a damage between 0 and 1, and from damage to a state: numbers
 //! that an engineer can edit.
 
-use intrados_stage::Estimate;
+use intrados_stage::{Estimate, access};
 use std::path::Path;
 
 use intrados_scene::Scene;
-use intrados_stage::access;
 use serde::{Deserialize, Serialize};
 
 pub use crate::error::ProfileError;

@@ -8,7 +8,7 @@
 
 use std::{error::Error, sync::Arc};
 
-use intrados_damage::gauges::rig::Rig;
+use intrados_gauges::rig::Rig;
 use intrados_light::{Extent, LitScene, Sensor, Stain, StainedLight, scene_rule};
 use intrados_mechanics::{member::Meshing, model::System};
 use intrados_scene::{Camera, Scene};

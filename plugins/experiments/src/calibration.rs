@@ -10,16 +10,17 @@
 use std::{collections::BTreeMap, sync::Arc};
 
 use intrados_scene::{Damage, Member, Scene, Slices};
-use intrados_stage::{Job, file::Set as Parts, random::Key};
+use intrados_stage::{
+    Job,
+    file::Set as Parts,
+    random::{Draw, Key},
+};
 use serde::{Deserialize, Serialize};
 
-use intrados_damage::{
-    evidence::Sources,
-    forecast::Forecast,
-    gauges,
-    predict::{Compared, MemberPrediction, PredictError, PredictSettings, Predictor},
-    score::MemberScore,
-};
+use intrados_damage::{evidence::Sources, score::MemberScore};
+use intrados_forecast::Forecast;
+use intrados_gauges as gauges;
+use intrados_predict::{Compared, MemberPrediction, PredictError, PredictSettings, Predictor};
 
 /// Schema of the JSON.
 pub const SCHEMA: &str = "intrados.experiment.calibration/2";
@@ -214,17 +215,16 @@ fn replanted(scene: &Scene, odds: Odds, planting: u64) -> Scene {
     scene
 }
 
-/// Numbers drawn one after the other.
-struct Dice(Key, u32);
+/// Numbers drawn one after the other, in single precision.
+struct Dice(Draw);
 
 impl Dice {
     fn new(planting: u64, member: usize) -> Self {
-        Self(Key::new(planting, member as u64), 0)
+        Self(Draw::coarse(Key::new(planting, member as u64)))
     }
 
     fn unit(&mut self) -> f32 {
-        self.1 += 1;
-        self.0.unit(self.1)
+        self.0.unit() as f32
     }
 
     fn span(&mut self, low: f32, high: f32) -> f32 {

@@ -158,9 +158,7 @@ impl Upcoming {
     }
 
     fn take(&mut self) -> Option<Render> {
-        let done = self.task().as_ref().and_then(Task::poll)?;
-        *self.task() = None;
-        done.ok()?.ok()
+        Task::take(&mut self.task())?.ok()?.ok()
     }
 }
 
@@ -212,8 +210,7 @@ fn take_compiled(
     mut commands: Commands,
 ) {
     let mut task = compiling.task.lock().unwrap_or_else(PoisonError::into_inner);
-    let Some(done) = task.as_ref().and_then(Task::poll) else { return };
-    *task = None;
+    let Some(done) = Task::take(&mut task) else { return };
     if let Ok(Ok(lit)) = done {
         if compiling.again {
             commands.insert_resource(Lit(Arc::new(lit)));

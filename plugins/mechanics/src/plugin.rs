@@ -6,7 +6,7 @@ use std::{collections::BTreeMap, sync::Arc};
 use bevy_app::{App, Plugin, Update};
 use bevy_ecs::prelude::*;
 use intrados_scene::{Member, Scene, SurfaceDamage, plugin::CurrentScene};
-use intrados_stage::{Job, Jobs, Stage, Task, alone};
+use intrados_stage::{Job, Jobs, Stage, Task, Unfinished, Work, alone};
 
 use crate::{
     analysis::{Outcome, analyze},
@@ -30,33 +30,20 @@ pub struct Analyze {
 #[derive(Message, Debug, Clone, PartialEq, Eq)]
 pub struct Stop(pub String);
 
-/// How an analysis stands.
+/// What came of an analysis.
 #[derive(Debug)]
-pub enum State {
-    /// It runs.
-    Running(Task<Result<(Outcome, Vec<SurfaceDamage>), Failed>>),
-    /// It is over; the outcome says whether it ended early.
-    Done(Arc<Outcome>),
-    /// It could not be computed: why.
-    Failed(String),
-    /// Somebody stopped it.
-    Cancelled,
-}
-
-/// Why there is no outcome.
-#[derive(Debug)]
-pub enum Failed {
-    /// Somebody stopped it.
-    Cancelled,
-    /// It could not be computed: why.
-    Because(String),
+pub struct Life {
+    /// Its results; they say whether it ended early.
+    pub outcome: Arc<Outcome>,
+    /// What is to be seen of it from outside.
+    damage: Vec<SurfaceDamage>,
 }
 
 /// One analysis.
 #[derive(Debug)]
 pub struct Analysis {
     /// How it stands.
-    pub state: State,
+    pub work: Work<Life>,
     /// What it has found so far.
     pub seen: Seen,
 }
@@ -75,7 +62,7 @@ impl Analyses {
     /// Whether any runs.
     #[must_use]
     pub fn is_busy(&self) -> bool {
-        self.0.values().any(|a| matches!(a.state, State::Running(_)))
+        self.0.values().any(|a| a.work.is_running())
     }
 }
 
@@ -113,7 +100,7 @@ fn begin(
         let task = Task::spawn(&mut jobs, label(&scene, &model), move |job| {
             alone(|| life(&scene, &wish, theirs, job))
         });
-        analyses.0.insert(model, Analysis { state: State::Running(task), seen });
+        analyses.0.insert(model, Analysis { work: Work::Running(task), seen });
     }
 }
 
@@ -122,18 +109,14 @@ fn label(scene: &Scene, model: &str) -> String {
     format!("stress of {}", scene.name_of(model))
 }
 
-fn life(
-    scene: &Scene,
-    wish: &Analyze,
-    seen: Seen,
-    job: &Job,
-) -> Result<(Outcome, Vec<SurfaceDamage>), Failed> {
-    let because = |e: &dyn std::fmt::Display| Failed::Because(e.to_string());
-    let unknown =
-        || Failed::Because(format!("{}: no member of this scene bears under that id", wish.model));
+fn life(scene: &Scene, wish: &Analyze, seen: Seen, job: &Job) -> Result<Life, Unfinished> {
+    let because = |e: &dyn std::fmt::Display| Unfinished::Because(e.to_string());
+    let unknown = || {
+        Unfinished::Because(format!("{}: no member of this scene bears under that id", wish.model))
+    };
     let assembly = scene.structure.assembly(&wish.model).ok_or_else(unknown)?;
     let failed = |e: &dyn std::fmt::Display| {
-        if job.is_cancelled() { Failed::Cancelled } else { because(e) }
+        if job.is_cancelled() { Unfinished::Cancelled } else { because(e) }
     };
     let whole = joined(scene, job).map_err(|e| failed(&e))?;
     let handed = whole.as_ref().and_then(|whole| whole.handed(&assembly.id));
@@ -142,9 +125,9 @@ fn life(
         prepare_within(scene, assembly, handed, wish.meshing, job).map_err(|e| failed(&e))?;
     let mut looking = Looking::new(&prepared, seen);
     match analyze(&prepared, MarchSettings::of_life(), job, &mut looking) {
-        Ok((outcome, _)) => Ok((outcome, looking.damage)),
+        Ok((outcome, _)) => Ok(Life { outcome: Arc::new(outcome), damage: looking.damage }),
         Err(Failure::Cancelled(_) | Failure::Solve(SolveError::Cancelled(_))) => {
-            Err(Failed::Cancelled)
+            Err(Unfinished::Cancelled)
         }
         Err(other) => Err(because(&other)),
     }
@@ -152,8 +135,8 @@ fn life(
 
 fn stop(mut wishes: MessageReader<Stop>, analyses: Res<Analyses>) {
     for Stop(model) in wishes.read() {
-        if let Some(Analysis { state: State::Running(task), .. }) = analyses.get(model) {
-            task.job().cancel();
+        if let Some(analysis) = analyses.get(model) {
+            analysis.work.cancel();
         }
     }
 }
@@ -165,25 +148,17 @@ fn take(
     mut commands: Commands,
 ) {
     for analysis in analyses.bypass_change_detection().0.values_mut() {
-        let State::Running(task) = &analysis.state else { continue };
-        analysis.state = match task.poll() {
-            None => continue,
-            Some(Ok(Ok((outcome, damage)))) => {
-                for (entity, member, before) in &members {
-                    let Some(now) = damage.iter().find(|d| d.member == member.id) else { continue };
-                    match before {
-                        Some(before) if before == now => {}
-                        None if now.is_empty() => {}
-                        _ => drop(commands.entity(entity).insert(now.clone())),
-                    }
-                }
-                State::Done(Arc::new(outcome))
+        if !analysis.work.settle() {
+            continue;
+        }
+        let Work::Done(life) = &analysis.work else { continue };
+        for (entity, member, before) in &members {
+            let Some(now) = life.damage.iter().find(|d| d.member == member.id) else { continue };
+            match before {
+                Some(before) if before == now => {}
+                None if now.is_empty() => {}
+                _ => drop(commands.entity(entity).insert(now.clone())),
             }
-            Some(Ok(Err(Failed::Cancelled))) => State::Cancelled,
-            Some(Ok(Err(Failed::Because(why)))) => State::Failed(why),
-            Some(Err(_)) => {
-                State::Failed("the analysis broke off: please report this scene".into())
-            }
-        };
+        }
     }
 }

@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use bevy_ecs::prelude::*;
-use intrados_damage::Progress;
 use intrados_light::{RenderSettings, View};
+use intrados_predict::Progress;
 use intrados_scene::plugin::{CurrentScene, OpenScene};
 
 use crate::{

@@ -187,8 +187,7 @@ pub(crate) fn write_png(
 
 /// Says how a write ended.
 pub(crate) fn take(mut export: ResMut<Export>, mut log: ResMut<Log>) {
-    let Some(done) = export.task.as_ref().and_then(Task::poll) else { return };
-    export.task = None;
+    let Some(done) = Task::take(&mut export.task) else { return };
     match done {
         Ok(Ok(what)) => log.say(format!("wrote {what}")),
         Ok(Err(error)) => log.say(format!("the picture was not written: {error}")),

@@ -116,8 +116,8 @@ pub(crate) fn paint(
         let (seen, picked) = (fields.seen, fields.picked);
         *fields = Fields { of: guide.cloned(), seen, picked, ..Fields::default() };
     }
-    if let Some(done) = fields.task.as_ref().and_then(Task::poll) {
-        (fields.task, fields.shown) = (None, done.ok());
+    if let Some(done) = Task::take(&mut fields.task) {
+        fields.shown = done.ok();
     }
     let is_wanted = matches!(look.quantity, Quantity::Field(_))
         && fields.task.is_none()

@@ -7,11 +7,11 @@ use bevy_ecs::{
     system::{IntoSystem, RegisteredSystemError, SystemId},
 };
 use egui::{CentralPanel, CollapsingHeader, Panel as Side, ScrollArea, Ui};
-use intrados_damage::Progress;
 use intrados_light::{
     Measurement, Render,
     plugin::{Learning, Upcoming},
 };
+use intrados_predict::Progress;
 use intrados_scene::{
     LoadError,
     plugin::{CurrentScene, SceneChanged, SceneFailed},

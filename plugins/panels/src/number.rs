@@ -1,5 +1,7 @@
 //! Numbers for people.
 
+use intrados_stage::time::{DAY, HOUR};
+
 /// `mean ± error unit`, the error with two digits and the mean with as many as it leaves. Where no
 /// error is known: the mean alone.
 ///
@@ -67,8 +69,8 @@ pub(crate) fn duration(seconds: f64) -> String {
         s if !s.is_finite() => "unknown".into(),
         s if s < 99.5 => format!("{s:.0} s"),
         s if s < 5_940.0 => format!("{:.0} min", s / 60.0),
-        s if s < 86_400.0 => format!("{:.1} h", s / 3_600.0),
-        s => format!("{:.0} d", s / 86_400.0),
+        s if s < DAY => format!("{:.1} h", s / HOUR),
+        s => format!("{:.0} d", s / DAY),
     }
 }
 

@@ -77,8 +77,7 @@ pub(crate) fn trace(
                 map(&scene, &camera, job)
             }));
     }
-    if let Some(done) = outline.task.as_ref().and_then(Task::poll) {
-        outline.task = None;
+    if let Some(done) = Task::take(&mut outline.task) {
         outline.map = done.ok().and_then(Result::ok);
     }
     if outline.drawn != Some(selected)

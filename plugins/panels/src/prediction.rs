@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use bevy_ecs::prelude::*;
-use intrados_damage::{Predicted, Progress, predict::Prediction, verdict::Verdict};
+use intrados_damage::verdict::Verdict;
+use intrados_predict::{Predicted, Prediction, Progress};
 use intrados_scene::plugin::{CurrentScene, SceneIndex};
 
 use crate::Log;

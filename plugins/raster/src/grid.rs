@@ -74,6 +74,14 @@ impl Grid<f32> {
         let kernel: Vec<f32> = (0..=2 * reach).map(weight).collect();
         let total: f32 = kernel.iter().sum();
         let kernel: Vec<f32> = kernel.into_iter().map(|weight| weight / total).collect();
+        self.convolved(&kernel, job)
+    }
+
+    /// Convolution with the same kernel along rows and columns, an odd number of weights; what lies
+    /// beyond the border is as at the border.
+    #[must_use]
+    pub fn convolved(&self, kernel: &[f32], job: &Job) -> Self {
+        let reach = kernel.len() / 2;
         let [w, h] = [self.width, self.height];
         let mut across = Self::new(w, h, 0.0);
         let lines = self.data.par_chunks(w.max(1)).zip(across.data.par_chunks_mut(w.max(1)));
@@ -81,12 +89,12 @@ impl Grid<f32> {
         lines.for_each_init(Vec::new, |line: &mut Vec<f32>, (row, out)| {
             line.clear();
             line.extend((0..w + 2 * reach).map(|x| row[x.saturating_sub(reach).min(w - 1)]));
-            weigh(&kernel, out, |k, at| &line[at + k..]);
+            weigh(kernel, out, |k, at| &line[at + k..]);
         });
         let mut down = Self::new(w, h, 0.0);
         let lines = down.data.par_chunks_mut(w.max(1)).enumerate();
         lines.filter(|_| !job.is_cancelled()).for_each(|(y, out)| {
-            weigh(&kernel, out, |k, at| {
+            weigh(kernel, out, |k, at| {
                 let from = (y + k).saturating_sub(reach).min(h - 1);
                 &across.data[from * w + at..]
             });

@@ -6,7 +6,7 @@ use std::{
 };
 
 use intrados_ct::{batch::pores_csv, picture::Picture};
-use intrados_damage::predict::Prediction;
+use intrados_predict::Prediction;
 use intrados_scene::Scene;
 use intrados_stage::file::{Set, WriteError, put_into};
 use serde::Serialize;

@@ -11,16 +11,15 @@ use intrados_ct::{
 };
 use intrados_damage::{
     Evidence,
-    forecast::FORECAST,
-    gauges::{GAUGES, GaugeReading},
     ledger::Group,
-    photographed::PHOTOGRAPHED,
-    predict::{Defect, MemberPrediction, Origin, Prediction, SliceReading},
-    survey::SURVEY,
     verdict::{Basis, NAMED},
     zone::place,
 };
+use intrados_forecast::FORECAST;
+use intrados_gauges::{GAUGES, GaugeReading};
+use intrados_predict::{Defect, MemberPrediction, Origin, Prediction, SliceReading};
 use intrados_stage::Estimate;
+use intrados_survey::{SURVEY, photographed::PHOTOGRAPHED};
 
 use super::{
     Document, Provenance, svg,

@@ -7,7 +7,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use intrados_damage::predict::{MemberPrediction, Prediction};
+use intrados_predict::{MemberPrediction, Prediction};
 use intrados_scene::{
     Scene,
     import::{ImportError, ifcopenshell},

@@ -10,9 +10,7 @@ use std::{
 
 use intrados_light::{LitScene, Render, RenderSettings, Sides, View, scene_rule, tone::Tone};
 use intrados_scene::{Camera, Scene, gltf::Model, import::ImportError};
-use intrados_stage::{Cancelled, Job};
-
-use intrados_stage::file::WriteError;
+use intrados_stage::{Cancelled, Job, file::WriteError};
 
 use super::{Document, Provenance, ifc, write};
 use crate::{
@@ -23,7 +21,7 @@ use crate::{
     },
 };
 use intrados_ct::picture::Picture;
-use intrados_damage::predict::{MemberPrediction, Prediction};
+use intrados_predict::{MemberPrediction, Prediction};
 
 /// Pictures of members in a report; the worst ones.
 const MOST_PICTURES: usize = 12;

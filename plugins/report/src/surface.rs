@@ -7,10 +7,10 @@ use glam::Vec3;
 use intrados_scene::{Material, Mesh, Object, Part, Scene, gltf::Model};
 
 use intrados_damage::{
-    predict::Prediction,
     verdict::Basis,
     zone::{ZONES, zone_at},
 };
+use intrados_predict::Prediction;
 
 /// Linear grey of what nothing is known of.
 pub const UNKNOWN: Vec3 = Vec3::splat(0.35);

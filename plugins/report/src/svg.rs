@@ -4,10 +4,10 @@ use intrados_stage::Estimate;
 use std::fmt::Write;
 
 use intrados_damage::{
-    predict::MemberPrediction,
     verdict::Basis,
     zone::{ZONES, middle},
 };
+use intrados_predict::MemberPrediction;
 
 /// Diameters of pores in classes of equal ratio (√2), with axes.
 pub(super) fn histogram(diameters: &[f64]) -> String {

@@ -7,10 +7,10 @@ use intrados_stage::csv::{Table, number};
 
 use intrados_damage::{
     evidence::Cause,
-    forecast::FORECAST,
-    predict::{MemberPrediction, Origin, Prediction},
     zone::{ZONES, Zones},
 };
+use intrados_forecast::FORECAST;
+use intrados_predict::{MemberPrediction, Origin, Prediction};
 
 /// One row a member.
 #[must_use]

@@ -1,9 +1,7 @@
 //! What every file of a report says of a member in the same words.
 
-use intrados_damage::{
-    grading::{Profile, State},
-    predict::{Defect, MemberPrediction},
-};
+use intrados_damage::grading::{Profile, State};
+use intrados_predict::{Defect, MemberPrediction};
 use intrados_stage::Estimate;
 
 use crate::basis::Basis;

@@ -7,10 +7,9 @@ use std::{
     io::{Cursor, Read},
 };
 
-use intrados_damage::{
-    Sources, forecast,
-    predict::{PredictSettings, Prediction, predict},
-};
+use intrados_damage::Sources;
+use intrados_forecast as forecast;
+use intrados_predict::{PredictSettings, Prediction, predict};
 use intrados_report::{Basis, Document, Provenance, Version, bcf, write};
 use intrados_scene::Scene;
 use intrados_stage::Job;

@@ -2,11 +2,9 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-use intrados_damage::{
-    Cause, Sources, forecast,
-    predict::{PredictSettings, Prediction, predict},
-    verdict::Basis,
-};
+use intrados_damage::{Cause, Sources, verdict::Basis};
+use intrados_forecast as forecast;
+use intrados_predict::{PredictSettings, Prediction, predict};
 use intrados_scene::{Scene, parametric::template};
 use intrados_stage::Job;
 

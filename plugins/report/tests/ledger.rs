@@ -5,13 +5,10 @@
 
 use std::{collections::BTreeMap, fs::File, path::Path};
 
-use intrados_damage::{
-    Cause, Evidence, EvidenceSource, Said, Sources, forecast,
-    gauges::{Simulation, simulate_with},
-    ledger::Item,
-    predict::{PredictError, PredictSettings, foreseen, predict},
-    zone::Zones,
-};
+use intrados_damage::{Cause, Evidence, EvidenceSource, Said, Sources, ledger::Item, zone::Zones};
+use intrados_forecast as forecast;
+use intrados_gauges::{Simulation, simulate_with};
+use intrados_predict::{PredictError, PredictSettings, foreseen, predict};
 use intrados_report::evidence_csv;
 use intrados_scene::{
     Scene,
@@ -134,7 +131,7 @@ impl EvidenceSource for Knocked {
         vec!["a knock".into(), "a knock beside it".into()]
     }
 
-    fn evidence(&self, scene: &Scene, index: usize, _: &Job) -> Result<Said, PredictError> {
+    fn evidence(&self, scene: &Scene, index: usize, _: &Job) -> Result<Said, EvidenceError> {
         let value = if scene.members[index].id == "B" { f64::NAN } else { 0.1 };
         let zones = [(Cause::Concrete, Zones::all(Estimate { value, std_error: 0.3 }))].into();
         Ok(Said {
@@ -294,7 +291,7 @@ fn a_name_that_is_taken_is_told() {
             vec!["another slice".into()]
         }
 
-        fn evidence(&self, _: &Scene, _: usize, _: &Job) -> Result<Said, PredictError> {
+        fn evidence(&self, _: &Scene, _: usize, _: &Job) -> Result<Said, EvidenceError> {
             unreachable!("nobody asks it")
         }
     }

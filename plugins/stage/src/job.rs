@@ -181,6 +181,67 @@ impl<T: Send + 'static> Task<T> {
     }
 }
 
+impl<T: Send + 'static> Task<T> {
+    /// What came of the task in `slot`, which is empty from then on; `None` while it goes on, and
+    /// where there is none.
+    pub fn take(slot: &mut Option<Self>) -> Option<Result<T, Fault>> {
+        let done = slot.as_ref()?.poll()?;
+        *slot = None;
+        Some(done)
+    }
+}
+
+/// How work off the frame stands, and what came of it.
+#[derive(Debug)]
+pub enum Work<T> {
+    /// It goes on.
+    Running(Task<Result<T, Unfinished>>),
+    /// It is there.
+    Done(T),
+    /// It could not be done: why.
+    Failed(String),
+    /// Somebody stopped it.
+    Cancelled,
+}
+
+/// Why work has come to nothing.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Unfinished {
+    /// Somebody stopped it.
+    Cancelled,
+    /// It could not be done: why.
+    Because(String),
+}
+
+impl<T: Send + 'static> Work<T> {
+    /// Whether it goes on.
+    pub const fn is_running(&self) -> bool {
+        matches!(self, Self::Running(_))
+    }
+
+    /// Asks it to stop, where it goes on.
+    pub fn cancel(&self) {
+        if let Self::Running(task) = self {
+            task.job().cancel();
+        }
+    }
+
+    /// Takes what has come of it; whether it has just ended.
+    pub fn settle(&mut self) -> bool {
+        let Self::Running(task) = self else { return false };
+        let Some(done) = task.poll() else { return false };
+        *self = match done {
+            Ok(Ok(done)) => Self::Done(done),
+            Ok(Err(Unfinished::Cancelled)) => Self::Cancelled,
+            Ok(Err(Unfinished::Because(why))) => Self::Failed(why),
+            Err(_) => {
+                Self::Failed(format!("the {} broke off: please report it", task.job().label()))
+            }
+        };
+        true
+    }
+}
+
 /// Does `work` in a pool of one thread that gives way to others, where the system lets threads
 /// (Linux): for a [`Task`] that nobody waits for. In the common pool the walks of a frame would
 /// wait for it, and as an equal of theirs it would take one of two cores from them.

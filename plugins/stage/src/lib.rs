@@ -16,6 +16,6 @@ pub use access::Access;
 pub use clock::{cpu_seconds, thread_cpu_seconds};
 pub use estimate::Estimate;
 pub use fault::{Fault, catch};
-pub use job::{Cancelled, Job, Jobs, Task, alone, aside};
+pub use job::{Cancelled, Job, Jobs, Task, Unfinished, Work, alone, aside};
 pub use pace::Pace;
 pub use stages::{Stage, StagePlugin};

@@ -55,6 +55,16 @@ pub trait Field: Sync + Sized {
     }
 }
 
+/// What a steered walk promises over the reading that it is expected to score, for
+/// [`expected_contribution`](crate::TransportProblem::expected_contribution). What is too little to
+/// be a number stays above nothing, which would end the walk; where no reading is known yet it is
+/// NaN, which neither splits nor ends one.
+#[must_use]
+pub fn promise<R: Real>(expected: R, reading: R) -> R {
+    let share = expected / reading;
+    if share < R::LEAST { R::LEAST } else { share }
+}
+
 /// Numbers that together say how large one value of a field is.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct FieldEvidence {
@@ -67,8 +77,11 @@ pub struct FieldEvidence {
 }
 
 impl FieldEvidence {
-    /// Takes one more.
+    /// Takes one more; what is no number says nothing.
     pub fn add(&mut self, v: f64) {
+        if !v.is_finite() {
+            return;
+        }
         self.n += 1;
         self.sum += v;
         self.squares += v * v;
@@ -151,6 +164,20 @@ mod tests {
         assert!((variance * 50.0 - 1.0).abs() < 0.1, "{variance}");
         let precision = runs.iter().map(FieldEvidence::precision_of_mean).sum::<f64>() / 4000.0;
         assert!((precision * variance - 1.0).abs() < 0.15, "{precision}");
+    }
+
+    /// A lesson of infinite weight would be all that a cell ever knew.
+    #[test]
+    fn what_is_no_number_teaches_nothing() {
+        let evidence = of(&[0.3, f64::INFINITY, f64::NAN]);
+        assert_eq!((evidence.n, evidence.sum), (1, 0.3));
+    }
+
+    #[test]
+    fn a_walk_of_little_promise_is_not_ended() {
+        assert_eq!(promise(1e-300, 1e100), f64::MIN_POSITIVE);
+        assert_eq!(promise(3.0_f32, 2.0), 1.5);
+        assert!(promise(1.0, f64::NAN).is_nan());
     }
 
     #[test]

@@ -24,8 +24,8 @@ pub use problem::{
     Ends, Links, RealOf, Side, States, Steps, TransportProblem, dimension, keep, spread,
 };
 pub use process::{
-    Course, Process, Residual, Round, STEERED_COST, Schedule, Steering, Trace, Watched, alternate,
-    watch,
+    Course, Process, Residual, Round, STEERED_COST, Schedule, Steering, Trace, Walked, Watched,
+    alternate, watch,
 };
 pub use reach::{Arrivals, Reach, Unmet, unmet};
 pub use stats::{

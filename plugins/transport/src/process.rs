@@ -3,7 +3,7 @@
 
 use std::ops::Range;
 
-use intrados_stage::{Cancelled, Job};
+use intrados_stage::{Cancelled, Job, cpu_seconds};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -97,12 +97,26 @@ impl Round {
     }
 }
 
+/// What the walks of one side in one round of learning came to.
+#[derive(Debug, Clone)]
+pub struct Walked {
+    /// Whether a field steered them.
+    pub steered: bool,
+    /// Their scores (of the first sensor, where there are several).
+    pub scores: Scores,
+    /// Their events.
+    pub events: u64,
+}
+
 /// A transport problem whose two walks can teach each other.
 pub trait Process {
-    /// `walks` walks of `side` in round `number`, steered by the side's field if it has one, that
-    /// then teach: what they have seen (photons) the other side's field, what they have found
-    /// (suffix scores) their own.
-    fn round(&mut self, number: u32, side: Side, walks: u64) -> Round;
+    /// `walks` walks of `side` in round `number`, steered by the side's field if it has one. What
+    /// they have seen (photons) is kept for the other side's field, what they have found (suffix
+    /// scores) for their own.
+    fn walk(&mut self, number: u32, side: Side, walks: u64) -> Walked;
+
+    /// Makes the field of `side` of what was kept for it; its cells.
+    fn teach(&mut self, side: Side) -> usize;
 
     /// How many of the `walks` that are to come it can pay for; 0 ends the learning.
     fn affords(&self, _number: u32, _side: Side, walks: u64) -> u64 {
@@ -144,7 +158,12 @@ pub fn alternate(
             if walks == 0 {
                 break 'rounds;
             }
-            course.rounds.push(process.round(number, side, walks));
+            let begin = cpu_seconds();
+            let Walked { steered, scores, events } = process.walk(number, side, walks);
+            let middle = cpu_seconds();
+            let cells = process.teach(side.other());
+            let cpu_seconds = [middle - begin, cpu_seconds() - middle];
+            course.rounds.push(Round { side, steered, scores, events, cpu_seconds, cells });
         }
         if steering == Steering::Auto && number >= PATIENCE.0 && course.gain() * PATIENCE.1 < 1.0 {
             break;
@@ -372,7 +391,7 @@ mod tests {
     }
 
     impl Process for Scripted {
-        fn round(&mut self, number: u32, side: Side, walks: u64) -> Round {
+        fn walk(&mut self, number: u32, side: Side, walks: u64) -> Walked {
             self.called.push((number, side, walks));
             // As in earnest: the primal's first round has nothing to be steered by; here the dual's
             // neither.
@@ -385,14 +404,11 @@ mod tests {
                     0,
                 )
             });
-            Round {
-                side,
-                steered,
-                scores,
-                events: self.events * walks,
-                cpu_seconds: [0.0; 2],
-                cells: 0,
-            }
+            Walked { steered, scores, events: self.events * walks }
+        }
+
+        fn teach(&mut self, _: Side) -> usize {
+            0
         }
     }
 

@@ -18,6 +18,8 @@ pub trait Real:
     const ZERO: Self;
     /// 1.
     const ONE: Self;
+    /// The smallest normal number above 0.
+    const LEAST: Self;
     /// Nearest number.
     fn of(x: f64) -> Self;
     /// As `f64`.
@@ -27,6 +29,7 @@ pub trait Real:
 impl Real for f32 {
     const ZERO: Self = 0.0;
     const ONE: Self = 1.0;
+    const LEAST: Self = Self::MIN_POSITIVE;
     fn of(x: f64) -> Self {
         x as Self
     }
@@ -38,6 +41,7 @@ impl Real for f32 {
 impl Real for f64 {
     const ZERO: Self = 0.0;
     const ONE: Self = 1.0;
+    const LEAST: Self = Self::MIN_POSITIVE;
     fn of(x: f64) -> Self {
         x
     }

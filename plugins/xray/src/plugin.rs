@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, sync::Arc};
 use bevy_app::{App, Plugin, Update};
 use bevy_ecs::prelude::*;
 use intrados_scene::{Scene, SurfaceDamage, plugin::CurrentScene};
-use intrados_stage::{Job, Jobs, Stage, Task, alone};
+use intrados_stage::{Job, Jobs, Stage, Task, Unfinished, Work, alone};
 
 use crate::{
     scan::{Acquisition, Corrections, Detector, Forming, Protocol, Restored, ScanError},
@@ -56,26 +56,13 @@ pub struct Scanned {
     pub corrections: Corrections,
 }
 
-/// How a scan stands.
-#[derive(Debug)]
-pub enum State {
-    /// It runs.
-    Running(Task<Result<Scanned, ScanError>>),
-    /// It is there.
-    Done(Scanned),
-    /// It could not be made: why.
-    Failed(String),
-    /// Somebody stopped it.
-    Cancelled,
-}
-
 /// One scan.
 #[derive(Debug)]
 pub struct Scan {
     /// What was asked for.
     pub wish: TakeScan,
     /// How it stands.
-    pub state: State,
+    pub work: Work<Scanned>,
     /// Its sinogram.
     pub sinogram: Forming,
     /// The slices before those that are being restored.
@@ -86,7 +73,7 @@ impl Scan {
     /// The newest slices.
     #[must_use]
     pub fn done(&self) -> Option<&Scanned> {
-        if let State::Done(done) = &self.state { Some(done) } else { self.before.as_ref() }
+        if let Work::Done(done) = &self.work { Some(done) } else { self.before.as_ref() }
     }
 }
 
@@ -104,7 +91,7 @@ impl Scans {
     /// Whether any runs.
     #[must_use]
     pub fn is_busy(&self) -> bool {
-        self.0.values().any(|s| matches!(s.state, State::Running(_)))
+        self.0.values().any(|s| s.work.is_running())
     }
 }
 
@@ -147,9 +134,9 @@ fn begin(
         let (wish, sinogram) = (wish.clone(), Forming::default());
         let (member, theirs, wanted) = (wish.member.clone(), sinogram.clone(), wish.clone());
         let task = Task::spawn(&mut jobs, format!("scan of {member}"), move |job| {
-            alone(|| scan(&scene, &damage, &wanted, &theirs, job))
+            alone(|| scan(&scene, &damage, &wanted, &theirs, job)).map_err(unfinished)
         });
-        scans.0.insert(member, Scan { wish, state: State::Running(task), sinogram, before: None });
+        scans.0.insert(member, Scan { wish, work: Work::Running(task), sinogram, before: None });
     }
 }
 
@@ -190,31 +177,36 @@ fn again(mut wishes: MessageReader<RestoreScan>, mut scans: ResMut<Scans>, mut j
                 let restored = Arc::new(acquisition.restore(corrections, job)?);
                 Ok(Scanned { acquisition, restored, corrections })
             })
+            .map_err(unfinished)
         });
         scan.wish.corrections = corrections;
-        (scan.before, scan.state) = (Some(done), State::Running(task));
+        (scan.before, scan.work) = (Some(done), Work::Running(task));
+    }
+}
+
+fn unfinished(error: ScanError) -> Unfinished {
+    match error {
+        ScanError::Cancelled(_) => Unfinished::Cancelled,
+        why => Unfinished::Because(why.to_string()),
     }
 }
 
 fn stop(mut wishes: MessageReader<StopScan>, scans: Res<Scans>) {
     for StopScan(member) in wishes.read() {
-        if let Some(Scan { state: State::Running(task), .. }) = scans.get(member) {
-            task.job().cancel();
+        if let Some(scan) = scans.get(member) {
+            scan.work.cancel();
         }
     }
 }
 
 fn take(mut scans: ResMut<Scans>) {
     for scan in scans.bypass_change_detection().0.values_mut() {
-        let State::Running(task) = &scan.state else { continue };
-        scan.state = match task.poll() {
-            None => continue,
-            Some(Ok(Ok(done))) => State::Done(done),
-            Some(Ok(Err(ScanError::Cancelled(_)))) => {
-                scan.before.take().map_or(State::Cancelled, State::Done)
-            }
-            Some(Ok(Err(why))) => State::Failed(why.to_string()),
-            Some(Err(_)) => State::Failed("the scan broke off: please report this scene".into()),
-        };
+        // Whoever stops a restoring keeps the slices before it.
+        if scan.work.settle()
+            && matches!(scan.work, Work::Cancelled)
+            && let Some(before) = scan.before.take()
+        {
+            scan.work = Work::Done(before);
+        }
     }
 }

@@ -9,7 +9,10 @@
 
 use glam::Vec3;
 use intrados_scene::{Damage, Frame, Member, Object, Part, Scene};
-use intrados_stage::random::Key;
+use intrados_stage::{
+    Job,
+    random::{Draw, Key},
+};
 use intrados_xray::specimen::concrete::wander;
 use rayon::prelude::*;
 
@@ -145,7 +148,7 @@ pub enum DrawError {
 pub fn draw(scene: &Scene, index: usize, request: Request) -> Result<Drawn, DrawError> {
     request.check()?;
     let member = scene.members.get(index).ok_or(DrawError::Member(index))?;
-    let mut dice = Dice { key: Key::new(request.seed, u64::from(request.index)), next: 0 };
+    let mut dice = Draw::coarse(Key::new(request.seed, u64::from(request.index)));
     let mut section = Section::of(scene, index, member, request);
     section.place();
     let mut body = section.body();
@@ -240,29 +243,6 @@ pub(crate) fn extent_mm(scene: &Scene, index: usize, along: f64) -> Option<[f64;
 /// overlap (the Boolean model).
 fn boolean(porosity: f32) -> f64 {
     -(1.0 - f64::from(porosity.clamp(0.0, 0.9))).ln()
-}
-
-/// Random numbers in a row.
-struct Dice {
-    key: Key,
-    next: u32,
-}
-
-impl Dice {
-    fn unit(&mut self) -> f64 {
-        self.next += 1;
-        f64::from(self.key.unit(self.next))
-    }
-
-    fn within(&mut self, from: f64, to: f64) -> f64 {
-        from + (to - from) * self.unit()
-    }
-
-    /// N(0,1) by Box and Muller.
-    fn normal(&mut self) -> f64 {
-        let (u, v) = (self.unit(), self.unit());
-        (-2.0 * (1.0 - u).ln()).sqrt() * (std::f64::consts::TAU * v).cos()
-    }
 }
 
 /// The section of a member in the pixels of a slice. Up in the picture is up in the world; of an
@@ -530,7 +510,7 @@ impl Section {
     }
 
     /// The part of the body where the concrete was badly compacted: around any of its pixels.
-    fn nest(&self, dice: &mut Dice, body: &Mask) -> Mask {
+    fn nest(&self, dice: &mut Draw, body: &Mask) -> Mask {
         let place: Vec<usize> = (0..body.data.len()).filter(|&i| body.data[i]).collect();
         let centre = place.get((dice.unit() * place.len() as f64) as usize).copied().unwrap_or(0);
         let (cx, cy) = self.offset(centre, [0.0; 2]);
@@ -561,7 +541,7 @@ impl Section {
     /// passes in front of the section or behind it.
     fn crack(
         &self,
-        dice: &mut Dice,
+        dice: &mut Draw,
         along: f32,
         width_mm: f32,
         depth: f32,
@@ -610,7 +590,7 @@ struct Discs(Vec<Disc>);
 impl Discs {
     /// Adds pores in `place` until their discs have `area` pixels together. Radii of the spheres
     /// are lognormal about `median`, and the plane cuts each anywhere.
-    fn scatter(&mut self, dice: &mut Dice, place: &Mask, area: f64, median: f64) {
+    fn scatter(&mut self, dice: &mut Draw, place: &Mask, area: f64, median: f64) {
         const MOST: usize = 200_000;
         let mut left = area;
         for _ in 0..MOST {
@@ -620,7 +600,7 @@ impl Discs {
             let (x, y) = (dice.unit() * place.width as f64, dice.unit() * place.height as f64);
             let largest = (0.1 * place.width as f64).max(2.0 * median);
             let sphere = (median.max(0.3) * (SIZE_SPREAD * dice.normal()).exp()).min(largest);
-            let cut = dice.within(-1.0, 1.0);
+            let cut = dice.between(-1.0, 1.0);
             if place.data[y as usize * place.width + x as usize] {
                 let radius = sphere * (1.0 - cut * cut).sqrt();
                 left -= std::f64::consts::PI * radius * radius;
@@ -714,7 +694,7 @@ fn paint(share: &mut Grid<f32>, at: [f64; 2], reach: f64, value: impl Fn(f64, f6
 }
 
 fn render(
-    dice: &mut Dice,
+    dice: &mut Draw,
     request: Request,
     mut body: Mask,
     bars: &[Disc],
@@ -781,14 +761,14 @@ fn render(
 
 /// What sound concrete and the scanner add: aggregate, bright specks, rings, cupping, correlated
 /// noise.
-fn texture(dice: &mut Dice, body: &Mask) -> Grid<f32> {
+fn texture(dice: &mut Draw, body: &Mask) -> Grid<f32> {
     let (w, h) = (body.width, body.height);
     let (area, side) = (body.count() as f64, w as f64);
     let mut texture = noise(dice, w, h);
     for _ in 0..(area / 600.0) as usize {
         let (at, radius, shade) = (
             [side * dice.unit(), side * dice.unit()],
-            dice.within(4.0, 22.0),
+            dice.between(4.0, 22.0),
             0.012 * dice.normal(),
         );
         stamp(&mut texture, at, radius, shade);
@@ -796,15 +776,15 @@ fn texture(dice: &mut Dice, body: &Mask) -> Grid<f32> {
     for _ in 0..(area / 1300.0) as usize {
         let (at, radius, shade) = (
             [side * dice.unit(), side * dice.unit()],
-            dice.within(0.6, 1.4),
-            dice.within(0.08, 0.3),
+            dice.between(0.6, 1.4),
+            dice.between(0.08, 0.3),
         );
         stamp(&mut texture, at, radius, shade);
     }
     let waves: Vec<[f64; 3]> = (0..6)
-        .map(|_| [0.0025 * dice.normal(), dice.within(0.05, 1.2), dice.within(0.0, 6.3)])
+        .map(|_| [0.0025 * dice.normal(), dice.between(0.05, 1.2), dice.between(0.0, 6.3)])
         .collect();
-    let cupping = dice.within(-0.008, 0.008);
+    let cupping = dice.between(-0.008, 0.008);
     for i in 0..w * h {
         let (x, y) = body.place(i);
         let r = (x as f64 - 0.5 * side).hypot(y as f64 - 0.5 * side);
@@ -830,7 +810,7 @@ fn stamp(texture: &mut Grid<f32>, at: [f64; 2], radius: f64, shade: f64) {
 
 /// White noise blurred by three widths: autocorrelation about .4, .2, .2 at one, two and three
 /// pixels.
-fn noise(dice: &mut Dice, w: usize, h: usize) -> Grid<f32> {
+fn noise(dice: &mut Draw, w: usize, h: usize) -> Grid<f32> {
     let mut sum = Grid::new(w, h, 0.0_f32);
     for (share, sigma) in [(0.68_f32, 0.39_f32), (0.22, 1.2), (0.10, 6.0)] {
         let white =
@@ -854,30 +834,6 @@ fn kernel(sigma: f32) -> Vec<f32> {
 
 /// Gaussian blur; the border repeats.
 fn blurred(grid: &Grid<f32>, sigma: f32) -> Grid<f32> {
-    let kernel = kernel(sigma);
-    transposed(&blurred_along(&transposed(&blurred_along(grid, &kernel)), &kernel))
+    grid.convolved(&kernel(sigma), &Job::default())
 }
-
-/// Blurs each row.
-fn blurred_along(grid: &Grid<f32>, kernel: &[f32]) -> Grid<f32> {
-    let half = kernel.len() / 2;
-    let mut smooth = Grid::new(grid.width, grid.height, 0.0_f32);
-    smooth.data.par_chunks_mut(grid.width).zip(grid.data.par_chunks(grid.width)).for_each(
-        |(to, row)| {
-            let (Some(&first), Some(&last)) = (row.first(), row.last()) else { return };
-            let padded: Vec<f32> = std::iter::repeat_n(first, half)
-                .chain(row.iter().copied())
-                .chain(std::iter::repeat_n(last, half))
-                .collect();
-            for (v, window) in to.iter_mut().zip(padded.windows(kernel.len())) {
-                *v = window.iter().zip(kernel).map(|(a, k)| a * k).sum();
-            }
-        },
-    );
-    smooth
-}
-
-fn transposed(grid: &Grid<f32>) -> Grid<f32> {
-    let (w, h) = (grid.width, grid.height);
-    Grid { width: h, height: w, data: (0..w * h).map(|i| grid.data[i % h * w + i / h]).collect() }
 }

@@ -6,7 +6,9 @@ use std::{f32::consts::FRAC_1_PI, ops::Range};
 
 use glam::Vec3;
 use intrados_stage::random::Key;
-use intrados_transport::{Ends, Field, Links, Side, Steps, TransportProblem, Value, dimension};
+use intrados_transport::{
+    Ends, Field, Links, Side, Steps, TransportProblem, Value, dimension, field::promise,
+};
 
 use super::{Charts, LightField, NONE, View, lobe::Spot};
 use crate::{
@@ -129,10 +131,8 @@ impl<'a> SteeredLight<'a> {
         if station.cell == NONE {
             return -albedo.max_element().clamp(0.05, 0.95);
         }
-        let expected =
-            luminance(Vec3::from(weight) * albedo) * station.view.total * FRAC_1_PI / self.reading;
-        // Where no reading is known yet, nobody can say: a NaN neither splits nor dies.
-        if expected < f32::MIN_POSITIVE { f32::MIN_POSITIVE } else { expected }
+        let brings = luminance(Vec3::from(weight) * albedo) * station.view.total * FRAC_1_PI;
+        promise(brings, self.reading)
     }
 
     /// Reflectance, roughly: exact for Lambert's law.

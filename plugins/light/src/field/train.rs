@@ -6,7 +6,7 @@ use std::{collections::BTreeMap, sync::Arc};
 
 use intrados_stage::{Cancelled, Job, cpu_seconds, random::Key};
 use intrados_transport::{
-    BATCH, Field, Process, Round, STEERED_COST, Schedule, Scores, Side, Steering, WalkRule,
+    BATCH, Field, Process, STEERED_COST, Schedule, Scores, Side, Steering, WalkRule, Walked,
     alternate, watch,
 };
 
@@ -85,6 +85,8 @@ struct Trainer<'a> {
     /// What walks of each side found of their own field in their last round, which was steered
     /// best.
     suffixes: [Vec<TrainingSample>; 2],
+    /// What the last walks of either side found of the other's.
+    photons: Vec<TrainingSample>,
     /// Events that may still be paid for, and by side those of a walk.
     left: f64,
     per_walk: [f64; 2],
@@ -116,6 +118,7 @@ pub fn learn(
         guide: Guide::new(Arc::clone(lit.charts()), sensors.len()),
         extras: sensors.iter().map(|sensor| Device::from(sensor).extra()).collect(),
         suffixes: Default::default(),
+        photons: Vec::new(),
         left: events as f64,
         per_walk: [GUESS; 2],
         walks: [0; 2],
@@ -131,8 +134,7 @@ pub fn learn(
 }
 
 impl Process for Trainer<'_> {
-    fn round(&mut self, number: u32, side: Side, walks: u64) -> Round {
-        let begin = cpu_seconds();
+    fn walk(&mut self, number: u32, side: Side, walks: u64) -> Walked {
         if number == 1 && side == Side::Primal {
             self.balance();
         }
@@ -145,28 +147,25 @@ impl Process for Trainer<'_> {
         self.guide.defence = DEFENCE[usize::from(number >= YOUNG)];
         self.read();
         let steered = !self.guide.fields[side as usize].is_empty();
-        let (scores, events, mut lessons) = self.walk(side, walks);
+        let (scores, events) = self.send(side, walks);
         let all = events * self.heads(side);
         self.left -= all as f64 * if steered { STEERED_COST } else { 1.0 };
         self.per_walk[side as usize] = all as f64 / walks as f64;
-        let middle = cpu_seconds();
-        let other = side.other() as usize;
-        // The other side's next round brings new ones.
-        lessons.append(&mut std::mem::take(&mut self.suffixes[other]));
+        Walked { steered, scores, events }
+    }
+
+    fn teach(&mut self, side: Side) -> usize {
+        let mut lessons = std::mem::take(&mut self.photons);
+        // The side's next round brings new ones.
+        lessons.append(&mut std::mem::take(&mut self.suffixes[side as usize]));
         let domain = Charted { lit: self.lit, charts: &self.guide.charts, extras: &self.extras };
-        self.guide.fields[other] = LightField::learn(&domain, lessons);
-        if other == Side::Dual as usize {
-            self.guide.lamps = lamps(self.lit, &self.guide.charts, &self.guide.fields[other]);
+        let field = LightField::learn(&domain, lessons);
+        if side == Side::Dual {
+            self.guide.lamps = lamps(self.lit, &self.guide.charts, &field);
         }
-        let cells = self.guide.fields[other].len();
-        Round {
-            side,
-            steered,
-            scores,
-            events,
-            cpu_seconds: [middle - begin, cpu_seconds() - middle],
-            cells,
-        }
+        let cells = field.len();
+        self.guide.fields[side as usize] = field;
+        cells
     }
 
     /// Bounded by what may be spent, and by memory.
@@ -186,9 +185,9 @@ impl Trainer<'_> {
         if side == Side::Primal { self.sensors.len() as u64 } else { 1 }
     }
 
-    /// Walks of one side, shared among the sensors if they start there; keeps what they teach their
-    /// own side. Scores of the first sensor, the mean events, and what they teach the other side.
-    fn walk(&mut self, side: Side, walks: u64) -> (Scores, u64, Vec<TrainingSample>) {
+    /// Walks of one side, shared among the sensors if they start there; keeps what they teach.
+    /// Scores of the first sensor, and the mean events.
+    fn send(&mut self, side: Side, walks: u64) -> (Scores, u64) {
         let heads = self.heads(side) as usize;
         let each = (walks / heads as u64).div_ceil(BATCH) * BATCH;
         let range = self.walks[side as usize]..self.walks[side as usize] + each;
@@ -239,7 +238,8 @@ impl Trainer<'_> {
             }
         }
         self.guide.last[side as usize] = all;
-        (first, events / heads as u64, photons)
+        self.photons = photons;
+        (first, events / heads as u64)
     }
 
     /// Lets every sensor count alike for the importance, by what unsteered walks have seen in it

@@ -1,5 +1,7 @@
 //! Steel: bars that yield, strands that relax, sections that rust away.
 
+use intrados_stage::time::HOUR;
+
 use super::{Error, MPA, checked};
 
 /// A bar: elastic, then linear hardening, of which a part moves the yield surface (kinematic,
@@ -107,9 +109,6 @@ impl Default for Strand {
         }
     }
 }
-
-/// Seconds in an hour.
-const HOUR: f64 = 3600.0;
 
 impl Strand {
     /// Checks the values.

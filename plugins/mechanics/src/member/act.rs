@@ -8,7 +8,7 @@ use intrados_scene::structure::{self, Body as Shape, GroundModel, Hold, Place};
 use super::{Draft, MemberError, body::LINING, warmth::Air};
 use crate::{
     element::spring::Winkler,
-    material::DAY,
+    material::{DAY, YEAR},
     mesh::HexFace,
     model::{Action, Bedding, Ground, JACKING, Load, SteelKind},
 };
@@ -365,7 +365,7 @@ impl Draft<'_> {
         // Of what a tunnel is made of, segments may be exposed for themselves.
         let own = self.scene.members.iter().filter(|m| self.member.holds(&m.id));
         let exposures = self.member.exposure.iter().chain(own.filter_map(|m| m.exposure.as_ref()));
-        events.extend(exposures.map(|e| f64::from(e.years) * 365.25 * DAY));
+        events.extend(exposures.map(|e| f64::from(e.years) * YEAR));
         events.retain(|&t| t >= begin && t.is_finite());
         events.sort_unstable_by(f64::total_cmp);
         events.dedup_by(|b, a| *b - *a < 60.0);

@@ -3,7 +3,7 @@
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use glam::DVec3;
-use intrados_stage::Job;
+use intrados_stage::{Job, time::HOUR};
 
 use super::{Checks, always, check, elastic, hold, near, node, solve, steps, within};
 use crate::{
@@ -14,8 +14,6 @@ use crate::{
     prestress::{self, Jack, Path},
     tensor::{cylindrical, rotate_stress},
 };
-
-const HOUR: f64 = 3600.0;
 
 fn tendon(friction: f64, wobble: f64, slip: f64) -> prestress::Tendon {
     prestress::Tendon {

@@ -12,7 +12,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use bevy_ecs::prelude::*;
 use egui::{ComboBox, Rect, Slider, TextureHandle, TextureOptions, Ui, pos2};
 use intrados_ct::{detect::Method, source::SliceShelf};
-use intrados_damage::Predicting;
+use intrados_predict::Predicting;
 use intrados_scene::{Member, Scene, plugin::CurrentScene};
 use intrados_stage::{Estimate, Jobs, Task};
 use intrados_xray::plugin::{Scan, Scans};
@@ -253,8 +253,7 @@ fn ask(
 
 /// Takes what has been read.
 fn collect(ui: &Ui, ct: &mut Ct) {
-    if let Some(done) = ct.task.as_ref().and_then(Task::poll) {
-        ct.task = None;
+    if let Some(done) = Task::take(&mut ct.task) {
         ct.shown = Some(match done {
             Ok(Ok(read)) => {
                 if let Some(place) = ct.profile.along.get_mut(ct.index) {
@@ -282,9 +281,8 @@ fn collect(ui: &Ui, ct: &mut Ct) {
             (Err(why), _) => profile.failures.push(why),
         }
     }
-    if profile.task.as_ref().is_some_and(|task| task.poll().is_some()) {
-        profile.task = None;
-    }
+    // Its rows have come one by one.
+    Task::take(&mut profile.task);
 }
 
 /// Which slice, how it is read and shown.

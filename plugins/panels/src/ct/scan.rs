@@ -3,8 +3,9 @@
 use bevy_ecs::prelude::*;
 use egui::{Color32, DragValue, ProgressBar, Rect, TextureHandle, TextureOptions, Ui, pos2, vec2};
 use intrados_scene::Scene;
+use intrados_stage::Work;
 use intrados_xray::{
-    plugin::{RestoreScan, Scan, State, StopScan, TakeScan},
+    plugin::{RestoreScan, Scan, StopScan, TakeScan},
     scan::Corrections,
 };
 
@@ -59,7 +60,7 @@ pub(super) fn controls(
     let first = || {
         scene.structure.scanners.first().and_then(|s| s.orbit.along.first().copied()).unwrap_or(0.5)
     };
-    let running = scan.is_some_and(|s| matches!(s.state, State::Running(_)));
+    let running = scan.is_some_and(|s| s.work.is_running());
     ui.horizontal_wrapped(|ui| {
         let mut along = wish.along.unwrap_or_else(first);
         ui.add_enabled_ui(!running, |ui| {
@@ -75,7 +76,7 @@ pub(super) fn controls(
             number(ui, "seed", DragValue::new(&mut wish.seed), "Of concrete and noise");
         });
         wish.along = Some(along);
-        if let Some(State::Running(task)) = scan.map(|s| &s.state) {
+        if let Some(Work::Running(task)) = scan.map(|s| &s.work) {
             if ui.button("⏹ Stop scan").clicked() {
                 asks.stop.write(StopScan(member.to_owned()));
             }
@@ -134,11 +135,11 @@ pub(super) fn controls(
                     .on_hover_text("Behind them less was left than its own error");
             }
         }
-        match scan.map(|s| &s.state) {
-            Some(State::Failed(why)) => {
+        match scan.map(|s| &s.work) {
+            Some(Work::Failed(why)) => {
                 drop(ui.colored_label(ui.visuals().error_fg_color, format!("⚠ Not scanned: {why}")))
             }
-            Some(State::Cancelled) => drop(ui.label("⏹ Stopped")),
+            Some(Work::Cancelled) => drop(ui.label("⏹ Stopped")),
             _ => {}
         }
     });
@@ -155,7 +156,7 @@ pub(super) fn waiting(ui: &mut Ui, picture: &mut Picture, scan: Option<&Scan>, n
         Some(scan) if !scan.sinogram.is_empty() => {
             sinogram(ui, picture, scan, ui.available_rect_before_wrap())
         }
-        Some(scan) if matches!(scan.state, State::Running(_)) => {
+        Some(scan) if scan.work.is_running() => {
             ui.add_space(24.0);
             ui.vertical_centered(|ui| {
                 ui.spinner();
@@ -179,7 +180,7 @@ pub(super) fn waiting(ui: &mut Ui, picture: &mut Picture, scan: Option<&Scan>, n
 /// The sinogram of the panel's middle row: views from the top, bins across.
 pub(super) fn sinogram(ui: &mut Ui, picture: &mut Picture, scan: &Scan, area: Rect) {
     let count = scan.sinogram.len();
-    let running = matches!(scan.state, State::Running(_));
+    let running = scan.work.is_running();
     if picture.0.as_ref().is_none_or(|p| p.0 != count) {
         let image = draw::sinogram(&scan.sinogram.row());
         match &mut picture.0 {

@@ -8,10 +8,8 @@ mod sheet;
 use bevy_ecs::prelude::*;
 use egui::{Grid, Rect, ScrollArea, Ui, pos2, vec2};
 use intrados_ct::score::Figure;
-use intrados_damage::{
-    ledger::Group,
-    predict::{MemberPrediction, Prediction},
-};
+use intrados_damage::ledger::Group;
+use intrados_predict::{MemberPrediction, Prediction};
 use intrados_scene::plugin::CurrentScene;
 use intrados_stage::Jobs;
 

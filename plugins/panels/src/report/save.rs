@@ -4,8 +4,8 @@ use std::{path::PathBuf, sync::Arc};
 
 use bevy_ecs::prelude::*;
 use egui::{Button, TextEdit, Ui};
-use intrados_damage::predict::Prediction;
 use intrados_light::LitScene;
+use intrados_predict::Prediction;
 use intrados_report::{Record, RecordError};
 use intrados_scene::Scene;
 use intrados_stage::{Cancelled, Job, Jobs, Task, aside};
@@ -83,8 +83,7 @@ fn write(
 /// Says how a write ended.
 pub(crate) fn take(mut report: ResMut<Report>, mut banners: ResMut<Banners>, mut log: ResMut<Log>) {
     let save = &mut report.bypass_change_detection().save;
-    let Some(done) = save.task.as_ref().and_then(Task::poll) else { return };
-    save.task = None;
+    let Some(done) = Task::take(&mut save.task) else { return };
     // What a panic said is told with all others.
     let Ok((folder, done)) = done else { return };
     let folder = folder.display();

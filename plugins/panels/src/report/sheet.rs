@@ -3,12 +3,11 @@
 
 use egui::{Rect, Sense, Ui, pos2, vec2};
 use intrados_damage::{
-    Predicted,
-    predict::{MemberPrediction, SliceReading},
     verdict::Basis,
     zone::{ZONES, place},
 };
 use intrados_light::tone::ColourMap;
+use intrados_predict::{MemberPrediction, Predicted, SliceReading};
 use intrados_scene::Scene;
 
 use crate::{Action, Actions, Latest, Selection, colours, number::plus_minus};

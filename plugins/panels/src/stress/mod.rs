@@ -17,12 +17,14 @@ use intrados_light::plugin::Widening;
 use intrados_mechanics::{
     analysis::Outcome,
     member::Meshing,
-    plugin::{Analyses, Analysis, Analyze, State, Stop},
+    plugin::{Analyses, Analysis, Analyze, Stop},
     skin::{Skin, Snapshot},
 };
 use intrados_scene::{Camera, Scene, SurfaceDamage, plugin::CurrentScene};
-use intrados_stage::time::DAY;
-use intrados_stage::{Jobs, Task};
+use intrados_stage::{
+    Jobs, Task, Work,
+    time::{DAY, YEAR},
+};
 
 use crate::{
     Actions, Log, Selection, colours, members,
@@ -133,8 +135,7 @@ impl Stress {
 
 /// Says how a write ended.
 pub(crate) fn take(mut stress: ResMut<Stress>, mut log: ResMut<Log>) {
-    let Some(done) = stress.task.as_ref().and_then(Task::poll) else { return };
-    stress.task = None;
+    let Some(done) = Task::take(&mut stress.task) else { return };
     match done {
         Ok(Ok(what)) => log.say(format!("wrote {what}")),
         Ok(Err(error)) => log.say(format!("not written: {error}")),
@@ -189,7 +190,7 @@ pub(crate) fn stress(
     let part = skin.parts.iter().position(|p| *p == member.id).map(|p| p as u32);
     let auto = scale_of(&skin, analysis);
     controls(ui, stress, &skin, auto);
-    time(ui, stress, &shot, index, count, matches!(analysis.state, State::Running(_)));
+    time(ui, stress, &shot, index, count, analysis.work.is_running());
     state(ui, analysis, &member.id);
     cracks(ui, &damage, &mut widening);
     let area = ui.available_rect_before_wrap();
@@ -228,7 +229,7 @@ fn run(
     stop: &mut MessageWriter<Stop>,
 ) {
     ui.separator();
-    if let Some(State::Running(_)) = analysis.map(|a| &a.state) {
+    if analysis.is_some_and(|a| a.work.is_running()) {
         if ui.button("⏹ Stop").on_hover_text("What has been found until then stays").clicked() {
             stop.write(Stop(model.to_owned()));
         }
@@ -287,8 +288,8 @@ fn invite(ui: &mut Ui, name: &str) {
 /// There is nothing to see, or not yet.
 fn waiting(ui: &mut Ui, analysis: &Analysis) {
     ui.add_space(24.0);
-    ui.vertical_centered(|ui| match &analysis.state {
-        State::Running(_) => {
+    ui.vertical_centered(|ui| match &analysis.work {
+        Work::Running(_) => {
             ui.spinner();
             ui.label("Looking for the first equilibrium…");
         }
@@ -298,15 +299,15 @@ fn waiting(ui: &mut Ui, analysis: &Analysis) {
 
 /// How the analysis ended, where that matters.
 fn state(ui: &mut Ui, analysis: &Analysis, part: &str) {
-    match &analysis.state {
-        State::Running(_) => {}
-        State::Cancelled => {
+    match &analysis.work {
+        Work::Running(_) => {}
+        Work::Cancelled => {
             ui.label("⏹ Stopped: what had been found until then is shown.");
         }
-        State::Failed(why) => {
+        Work::Failed(why) => {
             ui.colored_label(ui.visuals().error_fg_color, format!("⚠ Not computed: {why}"));
         }
-        State::Done(outcome) => ended(ui, outcome, part),
+        Work::Done(life) => ended(ui, &life.outcome, part),
     }
 }
 
@@ -439,7 +440,7 @@ pub(crate) fn moment(time: f64) -> String {
     match time / DAY {
         d if d.abs() < 0.1 => format!("{:.0} min", time / 60.0),
         d if d < 1000.0 => format!("day {}", significant(d, 3)),
-        d => format!("year {:.1}", d / 365.25),
+        d => format!("year {:.1}", d * DAY / YEAR),
     }
 }
 

@@ -9,10 +9,8 @@ mod xml;
 use std::io::{self, Cursor, Write};
 
 use glam::DVec3;
-use intrados_damage::{
-    predict::{Defect, MemberPrediction, Prediction},
-    zone::ZONES,
-};
+use intrados_damage::zone::ZONES;
+use intrados_predict::{Defect, MemberPrediction, Prediction};
 use intrados_scene::{
     Scene,
     structure::{Date, Georeference},

@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector};
 use super::{Exact, MatrixField, MatrixProblem, MatrixStates, START, spectral_radius};
 use crate::{
     Ends, Links, Side, Steps, TransportProblem, WalkRule, dimension,
-    field::Field,
+    field::{Field, promise},
     walk::{COPIES, split, window},
 };
 
@@ -113,7 +113,7 @@ impl<'a> SteeredMatrix<'a> {
     fn expected_of(&self, from: u32, weight: f64, reading: f64) -> f64 {
         let value = self.field.value(&from);
         if value > 0.0 {
-            (weight * (value + self.far(from)) / reading).max(f64::MIN_POSITIVE)
+            promise(weight * (value + self.far(from)), reading)
         } else {
             -self.go_on(from)
         }

@@ -4,7 +4,7 @@ use super::{MatrixField, MatrixProblem, MatrixSample, MatrixStates, SteeredMatri
 use crate::{
     Estimator, Scores, Side, Tally, WalkObserver, WalkRule,
     field::Field,
-    process::{Process, Round, Trace, watch},
+    process::{Process, Trace, Walked, watch},
 };
 
 /// Least and largest share of ways that ignore the field.
@@ -105,19 +105,6 @@ impl<'a> Trainer<'a> {
         (squares / all).sqrt()
     }
 
-    fn teach(&mut self, side: Side) {
-        if self.learns == Learns::OneSided && side == Side::Dual {
-            return;
-        }
-        let photons =
-            self.photons[side.other() as usize].iter().filter(|_| self.learns != Learns::Suffixes);
-        let suffixes = self.suffixes[side as usize]
-            .iter()
-            .filter(|_| matches!(self.learns, Learns::Both | Learns::Suffixes));
-        let lessons = photons.chain(suffixes).copied().collect();
-        self.fields[side as usize] = MatrixField::learn(&(self.problem, side), lessons);
-    }
-
     /// Notes what a round of `walks` walks has brought.
     fn note(&mut self, side: Side, walks: u64, trace: Trace<Visit>) {
         for (Visit { state, weight }, score) in trace.suffixes() {
@@ -136,8 +123,7 @@ impl<'a> Trainer<'a> {
 }
 
 impl Process for Trainer<'_> {
-    fn round(&mut self, _: u32, side: Side, walks: u64) -> Round {
-        let begin = cpu_seconds();
+    fn walk(&mut self, _: u32, side: Side, walks: u64) -> Walked {
         let own = side as usize;
         let problem = self.steer(side);
         let rule = WalkRule { estimator: Estimator::LastEvent, ..WalkRule::default() };
@@ -151,12 +137,8 @@ impl Process for Trainer<'_> {
         let (mut scores, mut events) = (Scores::default(), 0);
         for batch in batches {
             events += batch.events;
-            batch
-                .tally
-                .0
-                .iter()
-                .zip(batch.walks)
-                .for_each(|(&x, walk)| scores.add(x, (walk % 2) as usize));
+            let scored = batch.tally.0.iter().zip(batch.walks);
+            scored.for_each(|(&x, walk)| scores.add(x, (walk % 2) as usize));
             self.note(side, walks, batch.observer.0);
         }
         let steered = !self.field(side).is_empty();
@@ -164,17 +146,20 @@ impl Process for Trainer<'_> {
             let residual = self.residual(side);
             self.residuals[own].push(residual);
         }
-        let middle = cpu_seconds();
-        self.teach(side.other());
-        let cells = self.field(side.other()).table().iter().filter(|&&f| f > 0.0).count();
-        Round {
-            side,
-            steered,
-            scores,
-            events,
-            cpu_seconds: [middle - begin, cpu_seconds() - middle],
-            cells,
+        Walked { steered, scores, events }
+    }
+
+    fn teach(&mut self, side: Side) -> usize {
+        let own = side as usize;
+        if self.learns != Learns::OneSided || side == Side::Primal {
+            let photons = self.photons[side.other() as usize].iter();
+            let photons = photons.filter(|_| self.learns != Learns::Suffixes);
+            let both = matches!(self.learns, Learns::Both | Learns::Suffixes);
+            let suffixes = self.suffixes[own].iter().filter(|_| both);
+            let lessons = photons.chain(suffixes).copied().collect();
+            self.fields[own] = MatrixField::learn(&(self.problem, side), lessons);
         }
+        self.fields[own].table().iter().filter(|&&f| f > 0.0).count()
     }
 }
 

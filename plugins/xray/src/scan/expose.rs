@@ -1,5 +1,6 @@
 //! What the panel reads.
 
+use intrados_raster::Grid;
 use intrados_stage::{Job, random::Key};
 use rayon::prelude::*;
 
@@ -136,34 +137,13 @@ fn spread(protocol: &Protocol) -> f64 {
     protocol.detector.blur.hypot(spot)
 }
 
-/// Gaussian along rows and columns.
+/// Gaussian along rows and columns, of both numbers of a pixel.
 fn blur(signal: &mut [[f32; 2]], [rows, bins]: [usize; 2], sigma: f64) {
-    if sigma < 0.05 {
-        return;
+    for k in 0..2 {
+        let plane = Grid { width: bins, height: rows, data: signal.iter().map(|s| s[k]).collect() };
+        let soft = plane.blurred(sigma, &Job::default());
+        signal.iter_mut().zip(soft.data).for_each(|(to, value)| to[k] = value);
     }
-    let reach = (3.0 * sigma).ceil() as isize;
-    let mut kernel: Vec<f32> =
-        (-reach..=reach).map(|i| (-0.5 * (i as f64 / sigma).powi(2)).exp() as f32).collect();
-    let sum: f32 = kernel.iter().sum();
-    kernel.iter_mut().for_each(|k| *k /= sum);
-    let mut pass = |count: usize, stride: usize, lines: usize, next: usize| {
-        let mut line = vec![[0.0_f32; 2]; count];
-        for l in 0..lines {
-            line.iter_mut().enumerate().for_each(|(i, v)| *v = signal[l * next + i * stride]);
-            for i in 0..count {
-                let mut sum = [0.0; 2];
-                for (k, weight) in kernel.iter().enumerate() {
-                    let at =
-                        (i as isize + k as isize - reach).clamp(0, count as isize - 1) as usize;
-                    sum[0] += weight * line[at][0];
-                    sum[1] += weight * line[at][1];
-                }
-                signal[l * next + i * stride] = sum;
-            }
-        }
-    };
-    pass(bins, 1, rows, bins);
-    pass(rows, bins, bins, 1);
 }
 
 /// What the pixels are like.

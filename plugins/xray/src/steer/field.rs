@@ -18,12 +18,21 @@ pub(crate) struct Taught {
 }
 
 impl Taught {
+    /// A photon that brings `v`; as in [`FieldEvidence`](intrados_transport::field::FieldEvidence)
+    /// what is no number teaches nothing.
     pub(crate) fn photon(&mut self, v: f64) {
+        if !v.is_finite() {
+            return;
+        }
         self.photons[0] += v;
         self.photons[1] += v * v;
     }
 
+    /// A suffix that scored `s` with weight `w`.
     pub(crate) fn suffix(&mut self, s: f64, w: f64) {
+        if !s.is_finite() || !w.is_finite() {
+            return;
+        }
         [s, w, s * s, s * w, w * w]
             .into_iter()
             .zip(&mut self.suffixes)

@@ -5,8 +5,8 @@ use std::ops::Range;
 
 use intrados_stage::{Cancelled, Job, cpu_seconds};
 use intrados_transport::{
-    BATCH, Course, Process, Roulette, Round, Schedule, Scores, Side, Steering, TransportProblem,
-    WalkEstimate, WalkRule, alternate, watch,
+    BATCH, Course, Process, Roulette, Schedule, Scores, Side, Steering, TransportProblem,
+    WalkEstimate, WalkRule, Walked, alternate, watch,
 };
 
 use super::{
@@ -146,8 +146,7 @@ pub fn learn(
 }
 
 impl Process for Trainer<'_> {
-    fn round(&mut self, number: u32, side: Side, walks: u64) -> Round {
-        let begin = cpu_seconds();
+    fn walk(&mut self, number: u32, side: Side, walks: u64) -> Walked {
         let plain = PhotonProblem::new(self.specimen, self.scanner).linked(self.links);
         let walks = if number == 0 { UNSTEERED * walks } else { walks };
         let range =
@@ -173,26 +172,16 @@ impl Process for Trainer<'_> {
         if reading.rel_error() < self.best {
             (self.best, self.guide.reading) = (reading.rel_error(), reading.mean);
         }
-        let middle = cpu_seconds();
-        self.teach(side.other());
-        Round {
-            side,
-            steered,
-            scores,
-            events,
-            cpu_seconds: [middle - begin, cpu_seconds() - middle],
-            cells: self.guide.domain.lattice.len(),
-        }
+        Walked { steered, scores, events }
     }
-}
 
-impl Trainer<'_> {
     /// Corrects the field of a side by its lessons, which are forgotten.
-    fn teach(&mut self, side: Side) {
+    fn teach(&mut self, side: Side) -> usize {
         let (side, taught) = (side as usize, &mut self.taught[side as usize]);
         self.guide.fields[side].learn(&self.guide.domain, taught, self.photons[side]);
         taught.iter_mut().for_each(|table| table.fill(Taught::default()));
         self.photons[side] = 0.0;
+        self.guide.domain.lattice.len()
     }
 }
 

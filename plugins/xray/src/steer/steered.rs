@@ -11,7 +11,7 @@ use std::{f64::consts::TAU, ops::Range};
 
 use glam::DVec3;
 use intrados_stage::random::{Draw, Key};
-use intrados_transport::{Ends, Links, Side, Steps, TransportProblem};
+use intrados_transport::{Ends, Links, Side, Steps, TransportProblem, field::promise};
 
 use super::{
     Domain, PhotonField,
@@ -326,10 +326,8 @@ impl TransportProblem for SteeredPhotons<'_> {
                     None => -self.plain.survival(side, label, photon.kev),
                     Some(cell) => {
                         photon.cell = cell as u32;
-                        let expected = weight[i]
-                            * self.value(COME, side, cell, photon.kev, photon.way)
-                            / self.reading;
-                        if expected < f64::MIN_POSITIVE { f64::MIN_POSITIVE } else { expected }
+                        let brings = self.value(COME, side, cell, photon.kev, photon.way);
+                        promise(weight[i] * brings, self.reading)
                     }
                 },
             };

@@ -2,12 +2,9 @@
 
 use glam::{DVec3, UVec3};
 use intrados_stage::{Job, random::Key};
+use statrs::distribution::{ContinuousCDF, Normal};
 
-use super::{
-    Body, GrowError, Kind, Recipe,
-    recipe::Air,
-    steel::{Rod, normal},
-};
+use super::{Body, GrowError, Kind, Recipe, recipe::Air, steel::Rod};
 use crate::march::Lattice;
 
 /// Grains below this many times the finest voxel are part of the mortar.
@@ -299,7 +296,9 @@ fn pores(
     let entrained = (1.0 - air.entrapped) * all;
     let fine = match air.spread {
         0.0 => f64::from(u8::from(air.median < least)),
-        spread => below(((least / air.median).ln() - 3.0 * spread * spread) / spread),
+        spread => {
+            Normal::standard().cdf(((least / air.median).ln() - 3.0 * spread * spread) / spread)
+        }
     };
     let (mut pores, mut volume) = (Vec::new(), 0.0);
     let mut i = 0_u64;
@@ -331,7 +330,7 @@ fn pores(
     let flat =
         |key: Key| DVec3::new(1.0, 0.8 + 0.2 * key.unit64(111), 0.45 + 0.35 * key.unit64(112));
     add(all - entrained, &|key| air.median.max(least) * (2.0 + 2.0 * key.unit64(110)), &flat)?;
-    add(all - fine * entrained, &|key| air.median * (air.spread * normal(key, 110)).exp(), &round)?;
+    add(all - fine * entrained, &|key| air.median * (air.spread * key.normal(110)).exp(), &round)?;
     Ok((pores, fine * entrained))
 }
 
@@ -342,16 +341,4 @@ fn round(key: Key) -> DVec3 {
 
 fn pore(diameter: f64, key: Key) -> Body {
     Body::new(Kind::Pore, diameter, round(key), 0, key)
-}
-
-/// Standard normal distribution function, by Simpson's rule from 0.
-fn below(z: f64) -> f64 {
-    let z = z.clamp(-8.0, 8.0);
-    let n = 400;
-    let step = z / f64::from(n);
-    let density =
-        |i: i32| (-0.5 * (f64::from(i) * step).powi(2)).exp() / std::f64::consts::TAU.sqrt();
-    let sum: f64 =
-        (0..n).step_by(2).map(|i| density(i) + 4.0 * density(i + 1) + density(i + 2)).sum();
-    0.5 + sum * step / 3.0
 }

@@ -28,11 +28,6 @@ pub(super) enum Found {
     Nothing,
 }
 
-/// A standard normal number (Box and Muller).
-pub(super) fn normal(key: Key, dimension: u32) -> f64 {
-    key.normal(dimension)
-}
-
 impl Rod {
     pub(super) fn new(bar: &Bar, seed: u64, number: usize) -> Self {
         let key = Key::new(seed, number as u64 | 2 << 40);

@@ -1,0 +1,9 @@
+#![doc = include_str!("../README.md")]
+
+mod course;
+mod life;
+mod width;
+
+pub use course::GaugeCourse;
+pub use life::*;
+pub use width::{Tie, crack_width};

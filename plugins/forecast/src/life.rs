@@ -1,0 +1,748 @@
+//! *Forecast*: what load, creep, shrinkage and chlorides have done to a member by now, and will
+//! have done some years on, by its life in finite elements.
+//!
+//! A section's damage is the share of its strength that is lost, by three causes together, 1 − Π(1
+//! − d): cracks (share of the section that is cracked, weighted by the opening as those that are
+//! seen are), concrete crushed beyond its peak, and steel lost to rust. A zone has the damage of
+//! its worst section. Rust is the mean over all that the exposure class leaves open
+//! (`intrados_mechanics::material::durability`), with its spread; where nothing is computed,
+//! nothing is said of steel. What nobody has written into the scene (bad compaction, impact, a
+//! leaking joint) no forecast knows.
+
+use std::collections::BTreeMap;
+
+use glam::{DVec3, Vec3};
+use intrados_mechanics::{
+    analysis::{MemberOutcome, Observer, analyze, past_peak},
+    element::rod::Piece,
+    material::{
+        concrete::{Class, secant_modulus, tensile_strength},
+        durability::{Bars, Corrosion, Lost},
+    },
+    member::{Handed, Meshing, Part, Prepared, largest_element, prepare_within},
+    model::{Failure, Gauge, History, MarchSettings, Point, SteelKind, Step, System},
+};
+use intrados_scene::{Assembly, Frame, MemberKind, Scene, structure::Body};
+use intrados_stage::{
+    Estimate, Job,
+    time::{DAY, YEAR},
+};
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+
+use crate::{GaugeCourse, Tie, crack_width, width::E_STEEL};
+
+use intrados_damage::{
+    evidence::{Cause, Evidence},
+    grading::GradingRule,
+    zone::{ZONES, Zones, place, together, zone_at},
+};
+
+/// The source name of evidence from the life in finite elements.
+pub const FORECAST: &str = "forecast";
+
+/// Bricks of a member: a forecast of seconds, not of minutes.
+const BRICKS: f64 = 150.0;
+/// Least edge of a brick as a share of the section's smallest measure.
+const FINEST: f64 = 0.3;
+/// Edge of the largest brick as a share of what its concrete's fracture energy allows.
+const LARGEST: f64 = 0.9;
+/// Tensile damage from which a brick's point counts as cracked.
+const CRACKED: f64 = 0.5;
+/// Characteristic strength where the class says nothing, Pa.
+const ASSUMED: f64 = 30e6;
+/// Cracks narrower than this are none, mm.
+const LEAST_MM: f64 = 0.01;
+/// Sectors of a lining's ring: its sections are those of its wall.
+const SECTORS: f64 = 12.0;
+
+/// How to forecast.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct ForecastSettings {
+    /// Years from now on.
+    pub ahead_years: f64,
+    /// Edge of elements, m; none: some 150 to a member.
+    pub element_m: Option<f64>,
+}
+
+impl Default for ForecastSettings {
+    fn default() -> Self {
+        Self { ahead_years: 20.0, element_m: None }
+    }
+}
+
+/// What is foretold of one zone: of its worst section.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Foretold {
+    /// Share of a section that is cracked, 0 to 1.
+    pub cracked: f64,
+    /// Widest crack, mm.
+    pub crack_mm: f64,
+    /// Share of a section that is crushed, 0 to 1.
+    pub crushed: f64,
+    /// Share of the bars' section lost to rust, 0 to 1; none where no bar runs or rust is not
+    /// computed.
+    pub steel_lost: Option<f64>,
+    /// Its standard error from what was assumed; 0 where all was given.
+    pub steel_lost_std_error: f64,
+    /// Damage of concrete: cracks and crushing.
+    pub concrete: f64,
+    /// Damage d of all that.
+    pub damage: f64,
+}
+
+/// What is known of the rust of a member.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Rust {
+    /// Whether it was computed.
+    pub computed: bool,
+    /// If not, why.
+    pub why_not: Option<String>,
+    /// What takes the skin of steel: chloride or carbonation.
+    pub attack: Option<String>,
+    /// What was assumed, and whose values these are; empty where the scene gives all.
+    pub assumed: Vec<String>,
+    /// Least cover of a bar, mm.
+    pub cover_mm: Option<f64>,
+    /// When steel there begins to rust, by the means of what was assumed, years after the attack
+    /// began; none: within a thousand years never.
+    pub depassivation_years: Option<f64>,
+    /// Probability that it has begun by now.
+    pub probability_depassivated: f64,
+}
+
+impl Rust {
+    fn not_computed(why: &str) -> Self {
+        Self { why_not: Some(why.to_owned()), ..Self::default() }
+    }
+
+    fn of(corrosion: &Corrosion, bars: &[Vec<Bars>; ZONES], age: f64) -> Self {
+        let Some(least) = bars.iter().flatten().copied().min_by(|a, b| a.cover.total_cmp(&b.cover))
+        else {
+            return Self::not_computed("no bars are known of it");
+        };
+        let years = corrosion.initiation(least.cover.max(0.0)) / YEAR;
+        Self {
+            computed: true,
+            why_not: None,
+            attack: Some(corrosion.attack.name().to_owned()),
+            assumed: corrosion.assumed.clone(),
+            cover_mm: Some(1e3 * least.cover),
+            depassivation_years: (years < 1000.0).then_some(years),
+            probability_depassivated: corrosion.lost(&[least], age).depassivated,
+        }
+    }
+
+    /// One line for people; `lost`: share of the bars with its error, where it was computed.
+    fn says(&self, lost: Option<Estimate>) -> String {
+        let (Some(attack), Some(lost)) = (self.attack.as_deref(), lost) else {
+            return format!(
+                "rust of bars not computed: {}",
+                self.why_not.as_deref().unwrap_or("no bar runs there")
+            );
+        };
+        let share = format!(
+            "({:.0} ± {:.0}) % of its bars rusted away",
+            100.0 * lost.value,
+            100.0 * lost.std_error
+        );
+        match self.assumed.is_empty() {
+            true => format!("{share} ({attack})"),
+            false => format!("{share} ({attack} by values assumed for the exposure class)"),
+        }
+    }
+}
+
+/// The future of one member.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Forecast {
+    /// Its id.
+    pub id: String,
+    /// Now.
+    pub now: [Foretold; ZONES],
+    /// `ahead_years` on; none: the member does not get that far.
+    pub later: Option<[Foretold; ZONES]>,
+    /// Years from now to `later`.
+    pub ahead_years: f64,
+    /// Age now, years.
+    pub age_years: f64,
+    /// What is known of its rust.
+    pub rust: Rust,
+    /// Largest compression of concrete, Pa (negative).
+    pub peak_compression_pa: f64,
+    /// Largest stress of a bar, Pa.
+    pub peak_bar_pa: f64,
+    /// Largest stress of a tendon, Pa.
+    pub peak_tendon_pa: Option<f64>,
+    /// Unknowns.
+    pub dof: usize,
+    /// What assumed concrete and reinforcement add to the relative error; 0 where they are stated.
+    #[serde(default)]
+    pub assumed_error: f64,
+    /// What its monitored gauges would show through its life.
+    #[serde(default)]
+    pub gauges: Vec<GaugeCourse>,
+    /// Why its life ended early; empty if it did not.
+    pub complaint: String,
+    /// Assumptions.
+    pub notes: Vec<String>,
+}
+
+/// Why nothing can be foretold.
+#[derive(Debug, thiserror::Error)]
+pub enum ForecastError {
+    /// Somebody asked to stop.
+    #[error("cancelled")]
+    Cancelled,
+    /// Why, one line.
+    #[error("{0}")]
+    Because(String),
+}
+
+/// Ids of the assemblies of a scene whose life can be foretold: those described by measures, and
+/// those of models that something holds: a support, or others.
+#[must_use]
+pub fn models(scene: &Scene) -> Vec<String> {
+    let structure = &scene.structure;
+    let is_held = |id: &str| structure.is_held(id) || structure.bears_as_one();
+    structure
+        .assemblies
+        .iter()
+        .filter(|a| a.body.is_some() || is_held(&a.id))
+        .map(|a| a.id.clone())
+        .collect()
+}
+
+/// The members of one model, through their life and on; as part of a structure, by what the rest
+/// of it hands on.
+///
+/// # Errors
+/// The model cannot be computed, or never was in equilibrium; or the job was cancelled.
+pub fn forecast(
+    scene: &Scene,
+    model: &str,
+    handed: Option<&Handed>,
+    rule: &GradingRule,
+    settings: ForecastSettings,
+    job: &Job,
+) -> Result<Vec<Forecast>, ForecastError> {
+    let mut prepared = prepared(scene, model, handed, settings, job)?;
+    let now = prepared.times.last().copied().unwrap_or(0.0);
+    prepared.times.push(now + settings.ahead_years * YEAR);
+    let mut watch = Watch::new(scene, &prepared, rule, now, job);
+    // Solvers would report shares of their own: how far the life is, its times tell.
+    let (outcome, _) =
+        analyze(&prepared, MarchSettings::of_life(), &job.part(0.0, 0.0), &mut watch).map_err(
+            |e| match e {
+                Failure::Cancelled(_) => ForecastError::Cancelled,
+                other if job.is_cancelled() => {
+                    tracing::debug!("{other}");
+                    ForecastError::Cancelled
+                }
+                other => ForecastError::Because(other.to_string()),
+            },
+        )?;
+    outcome.warnings.iter().for_each(|w| tracing::warn!("{model}: {w}"));
+    let gauges = std::mem::take(&mut watch.courses);
+    let reached =
+        outcome.steps.iter().rev().find(|s| s.residual.is_finite()).map_or(0.0, |s| s.time_s);
+    if reached < now - 60.0 {
+        return Err(ForecastError::Because(format!(
+            "its life ends after {:.0} days: {}",
+            reached / DAY,
+            outcome.complaint
+        )));
+    }
+    let tendon = |m: &MemberOutcome| m.tendons.iter().map(|t| t.peak_stress_pa).reduce(f64::max);
+    // Rust depends on time alone, so that only now and the end are looked at.
+    let rust: Vec<Rust> =
+        (0..watch.parts.len()).map(|part| watch.corrode(part, now, reached)).collect();
+    let told =
+        outcome.members.iter().zip(watch.parts).zip(rust).map(|((m, part), rust)| Forecast {
+            id: m.name.clone(),
+            rust,
+            now: part.now,
+            later: outcome.complaint.is_empty().then_some(part.last),
+            ahead_years: settings.ahead_years,
+            age_years: now / YEAR,
+            peak_compression_pa: m.peak_compression_pa,
+            peak_bar_pa: m.peak_bar_stress_pa,
+            peak_tendon_pa: tendon(m),
+            dof: outcome.dof,
+            assumed_error: scene.structure.assembly(model).map_or(0.0, assumed_error),
+            gauges: gauges.clone(),
+            complaint: outcome.complaint.clone(),
+            notes: outcome.warnings.iter().chain(&outcome.notes).cloned().collect(),
+        });
+    Ok(told.collect())
+}
+
+fn prepared(
+    scene: &Scene,
+    model: &str,
+    handed: Option<&Handed>,
+    settings: ForecastSettings,
+    job: &Job,
+) -> Result<Prepared, ForecastError> {
+    let because = |e: &dyn std::fmt::Display| ForecastError::Because(e.to_string());
+    let assembly = scene
+        .structure
+        .assembly(model)
+        .ok_or_else(|| because(&format!("{model}: no such member")))?;
+    let ours = scene.members.iter().find(|m| m.id == model);
+    let edge = || {
+        let member = ours?;
+        if let Some(wall) = assembly.body.as_ref().and_then(inner_wall) {
+            return Some(wall);
+        }
+        let smallest = (member.bounds[1] - member.bounds[0]).as_dvec3().min_element();
+        let most = largest_element(scene, assembly).map_or(f64::INFINITY, |edge| LARGEST * edge);
+        // A tunnel's model holds more than its members: its own choice of elements is better.
+        (member.kind != MemberKind::Lining && member.volume > 0.0)
+            .then(|| (FINEST * smallest).max((member.volume / BRICKS).cbrt()).min(most))
+    };
+    let meshing = Meshing { element: settings.element_m.or_else(edge) };
+    prepare_within(scene, assembly, handed, meshing, job)
+        .map_err(|e| if job.is_cancelled() { ForecastError::Cancelled } else { because(&e) })
+}
+
+/// The bars of a model's members, and what attacks them.
+pub(crate) struct BarsOf {
+    /// What may attack them, or why nobody knows.
+    pub(crate) corrosion: Result<Corrosion, String>,
+    /// Since the attack began, now, s.
+    pub(crate) age: f64,
+    /// By member.
+    pub(crate) parts: Vec<PartBars>,
+}
+
+/// The bars of a member, by zone.
+pub(crate) struct PartBars {
+    /// Its id.
+    pub(crate) id: String,
+    /// Along its axis.
+    pub(crate) bars: [Vec<Bars>; ZONES],
+    /// Concrete over the outermost steel, stirrups too, m.
+    pub(crate) outer: [Option<f64>; ZONES],
+}
+
+/// The bars of a model as a forecast has them.
+///
+/// # Errors
+/// The model cannot be prepared; or the job was cancelled.
+pub(crate) fn bars_of(
+    scene: &Scene,
+    model: &str,
+    rule: &GradingRule,
+    job: &Job,
+) -> Result<BarsOf, ForecastError> {
+    // How it is held matters to no bar: any body can be held lightly.
+    let light = Handed::default();
+    let prepared = prepared(scene, model, Some(&light), ForecastSettings::default(), job)?;
+    let now = prepared.times.last().copied().unwrap_or(0.0);
+    let watch = Watch::new(scene, &prepared, rule, now, job);
+    let part = |k: usize| PartBars {
+        id: prepared.parts[k].id.clone(),
+        bars: watch.bars(k),
+        outer: watch.outer(k),
+    };
+    Ok(BarsOf {
+        parts: (0..prepared.parts.len()).map(part).collect(),
+        corrosion: prepared.corrosion.clone(),
+        age: (now - prepared.attacked).max(0.0),
+    })
+}
+
+/// Looks at every equilibrium, and keeps that of now and the last.
+struct Watch<'a> {
+    prepared: &'a Prepared,
+    rule: &'a GradingRule,
+    until: f64,
+    job: &'a Job,
+    parts: Vec<PartWatch>,
+    /// The part that a brick belongs to.
+    part_of: Vec<Option<usize>>,
+    cover: f64,
+    /// Monitored gauges of strain, each with one of stress at its place, and what they show.
+    monitored: Vec<[Gauge; 2]>,
+    courses: Vec<GaugeCourse>,
+}
+
+struct PartWatch {
+    frame: Frame,
+    ring: bool,
+    /// Mean tensile strength, Pa, and E_s/E_cm.
+    tensile_strength: f64,
+    modular_ratio: f64,
+    now: [Foretold; ZONES],
+    last: [Foretold; ZONES],
+}
+
+/// A layer of bricks across the axis, of a ring a sector of it.
+#[derive(Default, Clone, Copy)]
+struct Layer {
+    volume: f64,
+    cracked: f64,
+    crushed: f64,
+    opening: f64,
+}
+
+impl<'a> Watch<'a> {
+    fn new(
+        scene: &Scene,
+        prepared: &'a Prepared,
+        rule: &'a GradingRule,
+        until: f64,
+        job: &'a Job,
+    ) -> Self {
+        let frame = |id: &str| {
+            scene.members.iter().find(|m| m.id == id).map_or(Frame::default(), |m| m.frame)
+        };
+        let is_ring = |kind| matches!(kind, MemberKind::Lining | MemberKind::Segment);
+        let empty = [Foretold::default(); ZONES];
+        let part = |p: &Part| {
+            let class = scene
+                .members
+                .iter()
+                .find(|m| m.id == p.id)
+                .and_then(|m| m.concrete.parse::<Class>().ok());
+            let fck = class.map_or(ASSUMED, |c| c.fck);
+            PartWatch {
+                frame: frame(&p.id),
+                ring: is_ring(p.kind),
+                tensile_strength: tensile_strength(fck),
+                modular_ratio: E_STEEL / secant_modulus(fck + 8e6),
+                now: empty,
+                last: empty,
+            }
+        };
+        let mut part_of = vec![None; prepared.model.mesh.hexes.len()];
+        for (i, part) in prepared.parts.iter().enumerate() {
+            part.hexes.iter().for_each(|&hex| part_of[hex as usize] = Some(i));
+        }
+        let cover = scene
+            .structure
+            .assembly(&prepared.id)
+            .and_then(|a| cover(a.body.as_ref()?))
+            .unwrap_or(0.05);
+        let monitored = monitored(scene, prepared);
+        Self {
+            prepared,
+            rule,
+            until,
+            job,
+            parts: prepared.parts.iter().map(part).collect(),
+            part_of,
+            cover,
+            monitored: monitored.iter().map(|(_, pair)| *pair).collect(),
+            courses: monitored.into_iter().map(|(course, _)| course).collect(),
+        }
+    }
+
+    /// Notes what monitored gauges would show.
+    fn listen(&mut self, structure: &System, history: &History, time: f64) -> Result<(), Failure> {
+        let modular = self.parts.first().map_or(1.0, |p| p.modular_ratio);
+        for (pair, course) in self.monitored.iter().zip(&mut self.courses) {
+            let read = structure.read(pair, history)?;
+            course.days.push(time / DAY);
+            course.strain.push(read[0]);
+            if time <= self.until + 60.0 {
+                course.elastic = read[1] * modular / E_STEEL;
+            }
+        }
+        Ok(())
+    }
+
+    fn zones(&self, part: usize, history: &History, points: &[[Point; 8]]) -> [Foretold; ZONES] {
+        let mut zones = [Foretold::default(); ZONES];
+        let held = self.held(part, history);
+        for ((zone, ..), layer) in self.layers(part, points) {
+            let (share, crushed) = (layer.cracked / layer.volume, layer.crushed / layer.volume);
+            // Bars hold cracks together that a coarse brick would show as one.
+            let width = if share > 0.0 { held[zone].unwrap_or(layer.opening) } else { 0.0 };
+            let told = &mut zones[zone];
+            told.cracked = told.cracked.max(share);
+            told.crack_mm = told.crack_mm.max(1e3 * width);
+            told.crushed = told.crushed.max(crushed);
+        }
+        for told in &mut zones {
+            let cracks = told.cracked * (told.crack_mm / self.rule.open_crack_mm).min(1.0);
+            told.concrete = together([cracks, told.crushed]);
+            told.damage = told.concrete;
+        }
+        zones
+    }
+
+    /// Adds rust to what is foretold of a part for now and for the end of its life.
+    fn corrode(&mut self, part: usize, now: f64, end: f64) -> Rust {
+        let corrosion = match &self.prepared.corrosion {
+            Ok(corrosion) => corrosion,
+            Err(why) => return Rust::not_computed(why),
+        };
+        let bars = self.bars(part);
+        let age = |time: f64| (time - self.prepared.attacked).max(0.0);
+        let told = &mut self.parts[part];
+        for (zones, age) in [(&mut told.now, age(now)), (&mut told.last, age(end))] {
+            for (told, bars) in zones.iter_mut().zip(&bars).filter(|(_, bars)| !bars.is_empty()) {
+                let Lost { share, std_error, .. } = corrosion.lost(bars, age);
+                (told.steel_lost, told.steel_lost_std_error) = (Some(share), std_error);
+                told.damage = together([told.concrete, share]);
+            }
+        }
+        Rust::of(corrosion, &bars, age(now))
+    }
+
+    /// The bars of a part along its axis that can rust, by zone; what has the same cover within a
+    /// tenth of a millimetre is one.
+    fn bars(&self, part: usize) -> [Vec<Bars>; ZONES] {
+        let mut groups: [BTreeMap<[i64; 2], Bars>; ZONES] =
+            std::array::from_fn(|_| BTreeMap::new());
+        for steel in
+            self.prepared.model.steel.iter().filter(|s| !matches!(s.kind, SteelKind::Tendon(_)))
+        {
+            let Some(rust) = &steel.rust else { continue };
+            for (piece, &cover) in
+                steel.pieces.iter().zip(&rust.cover).filter(|(piece, _)| self.is_along(part, piece))
+            {
+                let zone = zone_at(self.parts[part].place(0.5 * (piece.ends[0] + piece.ends[1])).0);
+                let key = [cover, rust.diameter].map(|m| (1e4 * m).round() as i64);
+                let group = groups[zone].entry(key).or_insert(Bars {
+                    weight: 0.0,
+                    cover,
+                    diameter: rust.diameter,
+                });
+                group.weight += steel.area * piece.length();
+            }
+        }
+        groups.map(|g| g.into_values().collect())
+    }
+
+    /// Concrete over the outermost steel of a part that can rust, m, by zone.
+    fn outer(&self, part: usize) -> [Option<f64>; ZONES] {
+        let mut outer = [None; ZONES];
+        let rusts = self.prepared.model.steel.iter().filter_map(|s| Some((s, s.rust.as_ref()?)));
+        for (steel, rust) in rusts {
+            let inside = |piece: &Piece| self.part_of[piece.host] == Some(part);
+            for (piece, cover) in
+                steel.pieces.iter().zip(&rust.cover).filter(|(piece, _)| inside(piece))
+            {
+                let zone = zone_at(self.parts[part].place(0.5 * (piece.ends[0] + piece.ends[1])).0);
+                let least: f64 = outer[zone].unwrap_or(f64::INFINITY);
+                outer[zone] = Some(least.min(*cover));
+            }
+        }
+        outer
+    }
+
+    /// Whether a piece of a bar lies in a part and along its axis.
+    fn is_along(&self, part: usize, piece: &Piece) -> bool {
+        let axis = self.parts[part].frame.axis.as_dvec3().normalize_or_zero();
+        self.part_of[piece.host] == Some(part)
+            && (piece.ends[1] - piece.ends[0]).normalize_or_zero().dot(axis).abs() >= 0.9
+    }
+
+    /// Bricks by zone, place along the axis (0.1 % of it) and sector.
+    fn layers(&self, part: usize, points: &[[Point; 8]]) -> BTreeMap<(usize, i64, i64), Layer> {
+        let watch = &self.parts[part];
+        let mesh = &self.prepared.model.mesh;
+        let mut layers: BTreeMap<(usize, i64, i64), Layer> = BTreeMap::new();
+        for &hex in &self.prepared.parts[part].hexes {
+            let centre = mesh.corners(hex).into_iter().sum::<DVec3>() / 8.0;
+            let (at, turn) = watch.place(centre);
+            let sector = if watch.ring { (turn * SECTORS).floor() as i64 } else { 0 };
+            let layer = layers.entry((zone_at(at), (1e3 * at).round() as i64, sector)).or_default();
+            let volume = mesh.hex_volume(hex);
+            layer.volume += volume;
+            for point in &points[hex as usize] {
+                let [tension, compression] = point.damage;
+                layer.cracked += if tension > CRACKED { volume / 8.0 } else { 0.0 };
+                layer.crushed += volume / 8.0 * past_peak([0.0, compression]);
+                layer.opening = layer.opening.max(point.crack);
+            }
+        }
+        layers
+    }
+
+    /// By zone: the width (m) of the cracks that its bars let open; none where no bar runs along
+    /// it.
+    fn held(&self, part: usize, history: &History) -> [Option<f64>; ZONES] {
+        let model = &self.prepared.model;
+        let axis = self.parts[part].frame.axis.as_dvec3().normalize_or_zero();
+        let mut places: Vec<(usize, DVec3, f64, f64)> = Vec::new();
+        for (steel, works) in model
+            .steel
+            .iter()
+            .zip(&history.steel)
+            .filter(|(s, _)| !matches!(s.kind, SteelKind::Tendon(_)))
+        {
+            for (piece, work) in
+                steel.pieces.iter().zip(works).filter(|(piece, _)| self.is_along(part, piece))
+            {
+                let middle = 0.5 * (piece.ends[0] + piece.ends[1]);
+                let zone = zone_at(self.parts[part].place(middle).0);
+                places.push((zone, middle - axis * middle.dot(axis), steel.area, work.stress));
+            }
+        }
+        let matter = |zone: usize| {
+            let (area, across, stress) = places
+                .iter()
+                .filter(|p| p.0 == zone)
+                .map(|p| (p.2, p.1, p.3))
+                .max_by(|a, b| a.2.total_cmp(&b.2))?;
+            let diameter = (4.0 * area / std::f64::consts::PI).sqrt();
+            let apart = places
+                .iter()
+                .map(|p| p.1.distance(across))
+                .filter(|&d| d > 0.5 * diameter)
+                .fold(f64::INFINITY, f64::min);
+            Some(Tie {
+                stress,
+                diameter,
+                spacing: if apart.is_finite() { apart } else { 1.0 },
+                cover: self.cover,
+                tensile_strength: self.parts[part].tensile_strength,
+                modular_ratio: self.parts[part].modular_ratio,
+            })
+        };
+        std::array::from_fn(|zone| matter(zone).map(|tie| crack_width(&tie)))
+    }
+}
+
+impl PartWatch {
+    /// Place along the axis (0 to 1), and about it (0 to 1).
+    fn place(&self, point: DVec3) -> (f64, f64) {
+        let axis = self.frame.axis.as_dvec3();
+        let from = point - self.frame.start.as_dvec3();
+        let along = from.dot(axis) / axis.length_squared().max(1e-12);
+        let ninety: Vec3 = self.frame.ninety();
+        let turn = from.dot(ninety.as_dvec3()).atan2(from.dot(self.frame.zero.as_dvec3()))
+            / std::f64::consts::TAU;
+        (along, turn.rem_euclid(1.0))
+    }
+}
+
+impl Observer for Watch<'_> {
+    fn see(
+        &mut self,
+        structure: &System,
+        history: &History,
+        step: &Step,
+        points: &[[Point; 8]],
+    ) -> Result<(), Failure> {
+        self.listen(structure, history, step.time)?;
+        for part in 0..self.parts.len() {
+            let zones = self.zones(part, history, points);
+            if step.time <= self.until + 60.0 {
+                self.parts[part].now = zones;
+            }
+            self.parts[part].last = zones;
+        }
+        let passed = self.prepared.times.iter().filter(|&&time| time <= step.time).count();
+        Ok(self.job.step(passed, self.prepared.times.len())?)
+    }
+}
+
+/// Gauges of strain that are read over the years, each with a gauge of stress at its place.
+fn monitored(scene: &Scene, prepared: &Prepared) -> Vec<(GaugeCourse, [Gauge; 2])> {
+    let is_read = |name: &str| scene.structure.series.iter().any(|s| s.gauge == name);
+    let of = |(name, gauge): &(String, Gauge)| match *gauge {
+        Gauge::Strain(host, along) if is_read(name) => {
+            let course = GaugeCourse { gauge: name.clone(), ..GaugeCourse::default() };
+            Some((course, [*gauge, Gauge::Stress(host, along)]))
+        }
+        _ => None,
+    };
+    prepared.gauges.iter().filter_map(of).collect()
+}
+
+/// Thickness of a tunnel's inner lining, m: one brick across it bends as two do, and takes a third
+/// of the time.
+fn inner_wall(body: &Body) -> Option<f64> {
+    match body {
+        Body::Tunnel { inner_lining, .. } => {
+            inner_lining.as_ref().map(|l| f64::from(l.thickness_m))
+        }
+        _ => None,
+    }
+}
+
+/// Concrete outside the longitudinal bars, m.
+fn cover(body: &Body) -> Option<f64> {
+    let reinforcement = body.reinforcement()?;
+    let stirrup = reinforcement.stirrups.as_ref().map_or(0.0, |s| s.diameter_mm);
+    Some(1e-3 * f64::from(reinforcement.cover_mm + stirrup))
+}
+
+/// What an assumed class adds to the relative error of cracking and crushing: strengths of
+/// neighbouring classes differ by a quarter (EN 206), and whoever assumes may be off by one or two.
+const CONCRETE_ASSUMED: f64 = 0.4;
+/// What assumed reinforcement adds: cracks' widths go with the inverse of its area (EN 1992-1-1,
+/// 7.3.4), and members have one to two times the least that a code allows.
+const STEEL_ASSUMED: f64 = 0.6;
+
+/// The relative error that assumptions about an assembly add to a forecast.
+fn assumed_error(assembly: &Assembly) -> f64 {
+    let concrete = if assembly.concrete_assumed { CONCRETE_ASSUMED } else { 0.0 };
+    let steel = if assembly.steel_assumed { STEEL_ASSUMED } else { 0.0 };
+    concrete.hypot(steel)
+}
+
+impl Forecast {
+    /// What it says of the member now; with `relative` error of the model.
+    #[must_use]
+    pub fn evidence(&self, relative: f64) -> Option<Evidence> {
+        let relative = relative.hypot(self.assumed_error);
+        let reading = |value: f64| Some(Estimate { value, std_error: relative * value });
+        // What was assumed has a spread of its own; what was given errs as the rest of the model.
+        let steel = |told: &Foretold| {
+            let value = told.steel_lost?;
+            Some(if self.rust.assumed.is_empty() {
+                Estimate { value, std_error: relative * value }
+            } else {
+                Estimate { value, std_error: told.steel_lost_std_error }
+            })
+        };
+        let zones = BTreeMap::from([
+            (Cause::Concrete, Zones(self.now.each_ref().map(|told| reading(told.concrete)))),
+            (Cause::Steel, Zones(self.now.each_ref().map(steel))),
+        ]);
+        let zones = zones.into_iter().filter(|(_, zones)| zones.worst().is_some()).collect();
+        let worst = (0..ZONES).fold(0, |worst, zone| {
+            if self.now[zone].damage > self.now[worst].damage { zone } else { worst }
+        });
+        let width = self.now.iter().map(|t| t.crack_mm).fold(0.0, f64::max);
+        let most = |told: &[Foretold; ZONES], of: fn(&Foretold) -> f64| {
+            told.iter().map(of).fold(0.0, f64::max)
+        };
+        let now = &self.now[worst];
+        let cracks = match now.crack_mm {
+            width if width >= LEAST_MM => {
+                format!("{:.0} % of a section cracked to {width:.2} mm", 100.0 * now.cracked)
+            }
+            _ => "no open cracks".into(),
+        };
+        let mut basis = format!(
+            "life of {:.0} years in finite elements; worst {} of the axis: {cracks}, {}",
+            self.age_years,
+            place(worst),
+            self.rust.says(steel(now))
+        );
+        if let Some(later) = &self.later {
+            basis +=
+                &format!("; in {:.0} years d {:.2}", self.ahead_years, most(later, |t| t.damage));
+        }
+        if self.assumed_error > 0.0 {
+            basis += "; concrete or bars are assumed, and the error is wider for it";
+        }
+        let serde_json::Value::Object(details) = json!({
+            "assumed_error": self.assumed_error, "age_years": self.age_years, "now": self.now, "later": self.later, "ahead_years": self.ahead_years,
+            "later_damage": self.later.as_ref().map(|l| most(l, |t| t.damage)),
+            "peak_compression_pa": self.peak_compression_pa, "peak_bar_pa": self.peak_bar_pa, "peak_tendon_pa": self.peak_tendon_pa,
+            "rust": self.rust, "unknowns": self.dof, "complaint": self.complaint, "notes": self.notes,
+        }) else {
+            return None;
+        };
+        let evidence = Evidence::new(FORECAST, false, zones, basis)?;
+        Some(Evidence { crack_width_mm: (width >= LEAST_MM).then_some(width), details, ..evidence })
+    }
+}

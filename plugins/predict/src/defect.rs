@@ -1,0 +1,177 @@
+//! Defects as an owner's list has them: what, where, how large, how much of it, told by whom.
+
+use std::path::PathBuf;
+
+use intrados_scene::{
+    Scene,
+    structure::{Course, Observation, Shows},
+};
+use intrados_stage::Estimate;
+use serde::Serialize;
+
+use intrados_ct::Picture;
+
+use crate::{CT, SliceReading, section::widest};
+use intrados_damage::zone::zone_at;
+use intrados_survey::{self as survey, SURVEY, photographed::PHOTOGRAPHED};
+
+/// One thing that is wrong with a member, as somebody found it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Defect {
+    /// What it is, for people: `"crack across"`.
+    pub kind: &'static str,
+    /// From and to on the member's axis, 0 to 1; none: nobody knows where.
+    pub along: Option<[f64; 2]>,
+    /// Side, degrees about the axis.
+    pub angle_deg: Option<f64>,
+    /// Its size with its error, for people: `"0.30 ± 0.05 mm wide"`.
+    pub size: String,
+    /// Width of a crack, mm.
+    pub width_mm: Option<f64>,
+    /// Length of a crack, m.
+    pub length_m: Option<f64>,
+    /// Area, m².
+    pub area_m2: Option<f64>,
+    /// Which source tells of it.
+    pub source: &'static str,
+    /// Which item of that source.
+    pub item: String,
+    /// The day on which it was found, where somebody said it.
+    pub date: Option<String>,
+    /// What it looks like, small.
+    #[serde(skip)]
+    pub picture: Option<Picture>,
+    /// Its photograph: read by whoever shows it, since a prediction is put together often.
+    #[serde(skip)]
+    pub photo: Option<PathBuf>,
+}
+
+impl Defect {
+    /// How much of it there is, for a bill: metres of crack or square metres.
+    #[must_use]
+    pub fn quantity(&self) -> Option<String> {
+        let length = self.length_m.map(|m| format!("{m:.2} m"));
+        self.area_m2.map(|m2| format!("{m2:.3} m²")).or(length)
+    }
+}
+
+/// All that was found on a member, by eyes and hammers first, then by photographs, then by CT.
+#[must_use]
+pub(crate) fn defects(
+    scene: &Scene,
+    member: &str,
+    photographed: &[Observation],
+    slices: &[SliceReading],
+) -> Vec<Defect> {
+    let seen = survey::of_member(scene, member).filter_map(|(_, o)| seen(SURVEY, o));
+    let shown = photographed.iter().filter_map(|o| self::seen(PHOTOGRAPHED, o));
+    seen.chain(shown).chain(grouped(slices).iter().flat_map(|group| sectioned(group))).collect()
+}
+
+/// What an observation found; none where it is a reading of an instrument, or where nothing was.
+fn seen(source: &'static str, o: &Observation) -> Option<Defect> {
+    let mut defect = Defect {
+        kind: "",
+        along: o.spot.is_placed().then(|| o.spot.along.map(f64::from)),
+        angle_deg: o.spot.angle_deg.map(f64::from),
+        size: String::new(),
+        width_mm: None,
+        length_m: None,
+        area_m2: None,
+        source,
+        item: o.name.clone(),
+        date: o.date.map(|d| d.to_string()),
+        picture: None,
+        photo: o.picture.clone(),
+    };
+    match o.shows {
+        Shows::Crack { width_mm, std_error_mm, course, length_m } => {
+            defect.kind = match course {
+                Course::Along => "crack along",
+                Course::Across => "crack across",
+                Course::Diagonal => "diagonal crack",
+                Course::Map => "net of cracks",
+            };
+            defect.size = format!("{width_mm:.2} ± {std_error_mm:.2} mm wide");
+            (defect.width_mm, defect.length_m) = (Some(width_mm), length_m);
+        }
+        Shows::Spall { area_m2, depth_mm, bars_bare } => {
+            defect.kind = if bars_bare { "spall, bars bare" } else { "spall" };
+            defect.size = depth_mm.map_or(String::new(), |mm| format!("{mm:.0} mm deep"));
+            defect.area_m2 = Some(area_m2);
+        }
+        Shows::Sounding { hollow_m2, tapped_m2 } if hollow_m2 > 0.0 => {
+            defect.kind = "hollow area";
+            defect.size = format!("of {tapped_m2:.2} m² tapped");
+            defect.area_m2 = Some(hollow_m2);
+        }
+        Shows::Rust { area_m2 } => {
+            (defect.kind, defect.area_m2) = ("rust stain", Some(area_m2));
+        }
+        Shows::Efflorescence { area_m2 } => {
+            (defect.kind, defect.area_m2) = ("efflorescence", Some(area_m2));
+        }
+        Shows::WetSpot { area_m2 } => (defect.kind, defect.area_m2) = ("wet spot", Some(area_m2)),
+        _ => return None,
+    }
+    Some(defect)
+}
+
+/// What the sections of a core show in one zone, of which many may show the same: the widest crack,
+/// what has fallen off, and what is gone of its bars, each where it is more than its error.
+fn sectioned(sections: &[&SliceReading]) -> Vec<Defect> {
+    let of = |slice: &SliceReading, kind, size, shown: usize| Defect {
+        kind,
+        along: slice.along.map(|along| [along; 2]),
+        angle_deg: slice.drilled.and_then(|d| d.angle_deg).map(f64::from),
+        size: match sections.len() {
+            1 => size,
+            all => format!("{size}, in {shown} of {all} sections"),
+        },
+        width_mm: None,
+        length_m: None,
+        area_m2: None,
+        source: CT,
+        item: format!("{}, {}", slice.core, slice.name),
+        date: slice.drilled.and_then(|d| d.date).map(|d| d.to_string()),
+        picture: None,
+        photo: None,
+    };
+    let cracked = || sections.iter().filter_map(|s| Some((*s, widest(&s.cracks)?)));
+    let worst = cracked().max_by(|a, b| a.1.width_mm.total_cmp(&b.1.width_mm));
+    let crack = worst.map(|(slice, crack)| Defect {
+        picture: slice.widest.clone(),
+        width_mm: Some(crack.width_mm),
+        length_m: Some(1e-3 * slice.cracks.iter().map(|c| c.length_mm).sum::<f64>()),
+        ..of(
+            slice,
+            "crack in the section",
+            format!("{:.2} mm wide", crack.width_mm),
+            cracked().count(),
+        )
+    });
+    let share = |kind, lost: &dyn Fn(&SliceReading) -> Option<Estimate>| {
+        let beyond = |l: &Estimate| l.value > 1.96 * l.std_error && l.value > 0.0;
+        let found = || sections.iter().filter_map(|s| Some((*s, lost(s).filter(beyond)?)));
+        let (slice, worst) = found().max_by(|a, b| a.1.value.total_cmp(&b.1.value))?;
+        let [value, error] = [worst.value, worst.std_error].map(|x| 100.0 * x);
+        let size = format!("{value:.1} ± {error:.1} % of the section");
+        Some(of(slice, kind, size, found().count()))
+    };
+    let off = share("fallen off", &|s| s.lost);
+    let rust = share("bars rusted away", &|s| Some(s.steel?.loss));
+    [crack, off, rust].into_iter().flatten().collect()
+}
+
+/// Sections by core and zone, in the order of the first of each.
+fn grouped(slices: &[SliceReading]) -> Vec<Vec<&SliceReading>> {
+    let place = |s: &SliceReading| (s.core_number, s.along.map(zone_at));
+    let mut groups: Vec<Vec<&SliceReading>> = Vec::new();
+    for slice in slices {
+        match groups.iter_mut().find(|g| place(g[0]) == place(slice)) {
+            Some(group) => group.push(slice),
+            None => groups.push(vec![slice]),
+        }
+    }
+    groups
+}

@@ -1,0 +1,93 @@
+//! What was surveyed on a member, from its file to the prediction.
+
+#![allow(clippy::unwrap_used, reason = "a test may end by a panic")]
+
+use std::fs;
+
+use intrados_damage::{Cause, Sources};
+use intrados_predict::{PredictSettings, Prediction, predict};
+use intrados_scene::Scene;
+use intrados_stage::Job;
+
+/// A column of .4 × .4 × 5 m with eight bars of 20 mm under 40 mm, thirty years old.
+fn predicted(exposure: &str, items: &str) -> Prediction {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = format!(
+        "(schema: \"intrados.scene/1\", members: [(id: \"C1\", name: \"C1\", concrete: \"C30/37\", \
+         body: Column(section: Rectangle(width_m: 0.4, depth_m: 0.4), height_m: 5, \
+         reinforcement: (cover_mm: 32, bars: [Around(count: 8, diameter_mm: 20)], stirrups: (diameter_mm: 8, spacing_mm: 200))), \
+         exposure: (class: \"{exposure}\", years: 30))], supports: [(member: \"C1\", place: Start, hold: Fixed)])"
+    );
+    fs::write(folder.path().join("scene.ron"), scene).unwrap();
+    let evidence = format!("(schema: \"intrados.evidence/1\", items: [{items}])");
+    fs::write(folder.path().join("evidence.ron"), evidence).unwrap();
+    let job = Job::default();
+    let scene = Scene::load(&folder.path().join("scene.ron"), &job).unwrap();
+    let settings = PredictSettings { forecast: None, ..PredictSettings::default() };
+    predict(&scene, settings, &Sources::default(), &job).unwrap()
+}
+
+fn item(name: &str, along: f64, shows: &str) -> String {
+    format!("(member: \"C1\", name: \"{name}\", along: {along}, face: Front, shows: {shows})")
+}
+
+/// Share of the steel that is gone where it was looked at.
+fn steel(prediction: &Prediction) -> [f64; 2] {
+    let survey = &prediction.members[0].evidence["survey"];
+    let zone = survey.zones[&Cause::Steel].0[4].unwrap();
+    [zone.value, zone.std_error]
+}
+
+#[test]
+fn every_item_is_in_the_ledger_and_readings_move_what_they_speak_of() {
+    let rusts = [
+        item("pot", 0.45, "HalfCell(mv: -420)"),
+        item("split", 0.45, "Crack(width_mm: 0.8, course: Along)"),
+    ];
+    let sound = [item("pot", 0.45, "HalfCell(mv: -90)"), item("look", 0.45, "Intact")];
+    let [bad, good] = [rusts, sound].map(|items| predicted("XC4, XD3", &items.join(", ")));
+    for prediction in [&bad, &good] {
+        assert!(prediction.items.iter().all(|i| i.used && i.source == "survey"));
+        assert_eq!(prediction.items.len(), 2);
+    }
+    assert!(steel(&bad)[0] > 0.03 && steel(&bad)[0] > 10.0 * steel(&good)[0], "{:?}", steel(&bad));
+    assert!(steel(&good)[1] < 0.05, "{:?}", steel(&good));
+    let defects: Vec<&str> = bad.members[0].defects.iter().map(|d| d.kind).collect();
+    assert_eq!(defects, ["crack along"]);
+    assert!(good.members[0].defects.is_empty());
+    // Far from the place nobody is told anything about steel.
+    assert!(bad.members[0].evidence["survey"].zones[&Cause::Steel].0[9].is_none());
+}
+
+/// A profile of salt where the class knows none, and a class that nobody named.
+#[test]
+fn what_cannot_be_weighed_says_why() {
+    let salt = item("dust", 0.45, "Chloride(depths_mm: [10, 30], percent_of_cement: [1.0, 0.4])");
+    let prediction = predicted("XC4", &salt);
+    let ledger = &prediction.items[0];
+    assert!(!ledger.used && ledger.why.as_ref().unwrap().contains("XD or XS"), "{ledger:?}");
+    let prediction = predicted("XF1", &item("pot", 0.45, "HalfCell(mv: -420)"));
+    let why = prediction.items[0].why.clone().unwrap();
+    assert!(why.contains("speaks of rust") && why.contains("XF1"), "{why}");
+    assert_eq!(prediction.members[0].state, "no evidence");
+}
+
+/// An instrument is held to one place, and somebody must say to which.
+#[test]
+fn a_reading_from_nowhere_is_not_used() {
+    let prediction = predicted("XC4", "(member: \"C1\", name: \"pot\", shows: HalfCell(mv: -420))");
+    let why = prediction.items[0].why.clone().unwrap();
+    assert!(why.contains("add along") && prediction.members[0].damage.is_none(), "{why}");
+}
+
+/// Half the strength that the class promises, in three cores of one place.
+#[test]
+fn cores_speak_of_strength() {
+    let core = "CoreStrength(mpa: 16, diameter_mm: 100, length_mm: 200)";
+    let items: Vec<String> = (0..3).map(|k| item(&format!("core {k}"), 0.45, core)).collect();
+    let prediction = predicted("XC4", &items.join(", "));
+    let zone = prediction.members[0].evidence["survey"].zones[&Cause::Concrete].0[4].unwrap();
+    // .85 · 38 MPa are promised.
+    assert!((zone.value - (1.0 - 16.0 / 32.3)).abs() < 0.02, "{zone:?}");
+    assert!((0.1..0.35).contains(&zone.std_error), "{zone:?}");
+}

@@ -1,0 +1,11 @@
+#![doc = include_str!("../README.md")]
+
+mod findings;
+pub mod photographed;
+mod rust;
+#[cfg(test)]
+mod simulate;
+mod strength;
+mod weighed;
+
+pub use weighed::*;

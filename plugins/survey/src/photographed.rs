@@ -1,0 +1,209 @@
+//! Photographs as evidence: each is placed, its light is taken off, and what its member's faces
+//! show becomes observations like those of an inspector, with the same likelihoods ([`survey`]). So
+//! that a crack seen twice, by an eye and in a photograph, is not two opinions of rust, both are
+//! weighed together.
+//!
+//! Of what a photograph does not show it says nothing: in a zone where nothing was found it speaks
+//! for the share of the surface that it shows, and of cracks that are wide enough to be seen.
+//!
+//! [`survey`]:
+
+use intrados_photo::{
+    Located, Photograph, Prior, Site,
+    face::{Chart, Surface},
+    locate,
+    map::MapError,
+    picks,
+    reading::{Defect, FaceReading, ReadFace, read_all},
+    relight::{RelightError, RelightSettings, relight},
+    taken::Focal,
+};
+use intrados_scene::{
+    Lens, Scene,
+    structure::{Observation, Photographed, Shows, Spot},
+};
+use intrados_stage::{Cancelled, Job};
+
+use intrados_damage::zone::{ZONES, zone_at};
+
+/// The source name of what photographs show, where nobody else looked at the member.
+pub const PHOTOGRAPHED: &str = "photographed";
+
+/// Standard error of k1 before anything is picked, as the command `photo` has it.
+const K1_ERROR: f64 = 0.05;
+/// A zone of which less than this share is seen was not looked at.
+const GLIMPSE: f64 = 0.02;
+/// What a photograph vouches for where it finds nothing, of what an inspector would: its network
+/// finds cracks, and hardly ever missing cover (ours).
+const VOUCHED: f64 = 0.5;
+/// What photographs cannot have shown where no scatter is known, mm.
+const UNKNOWN_MM: f64 = 1.0;
+
+/// Why a photograph says nothing.
+#[derive(Debug, thiserror::Error)]
+pub enum PhotoError {
+    /// A reason, one line.
+    #[error("{0}")]
+    Because(String),
+    /// Somebody asked to stop.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}
+
+/// What a photograph is called in the ledger, unique within its member.
+#[must_use]
+pub(crate) fn name(photo: &Photographed) -> String {
+    let file = photo.file.file_name().unwrap_or_default().to_string_lossy();
+    format!("{} (photograph {file})", photo.name)
+}
+
+fn because(why: impl std::fmt::Display) -> PhotoError {
+    PhotoError::Because(why.to_string())
+}
+
+/// Opens a photograph and finds out where it was taken from.
+///
+/// # Errors
+/// It cannot be read, its picks cannot or do not fit, or the job was cancelled.
+pub fn placed(
+    scene: &Scene,
+    photo: &Photographed,
+    job: &Job,
+) -> Result<(Photograph, Site, Located), PhotoError> {
+    let photograph = Photograph::open(&photo.file).map_err(because)?;
+    let site = Site::new(scene, job)?;
+    let name = photo.file.file_name().map(|n| n.to_string_lossy().into_owned());
+    let all = picks::read(&photo.picks, scene, &site).map_err(because)?;
+    let of_it = all.iter().filter(|p| p.photo.is_none() || p.photo == name);
+    let picks: Vec<_> = of_it.map(|p| p.pick).collect();
+    let known = photo.focal_px.map(|px| Focal { px, rel_error: 0.0 });
+    let prior = Prior {
+        size: photograph.size,
+        focal: known.or_else(|| photograph.taken.focal(photograph.size)),
+        lens: Lens::default(),
+        k1_error: K1_ERROR,
+        picking_px: photo.picking_px,
+    };
+    let located = locate(&picks, &prior, &|pose| site.admits(pose, &picks)).map_err(because)?;
+    Ok((photograph, site, located))
+}
+
+/// What a photograph shows of its member.
+pub(crate) fn observed(
+    scene: &Scene,
+    photo: &Photographed,
+    job: &Job,
+) -> Result<Vec<Observation>, PhotoError> {
+    let member = scene.members.iter().position(|m| m.id == photo.member);
+    let member = member.ok_or_else(|| because("its member is lost"))?;
+    let (photograph, site, located) = placed(scene, photo, job)?;
+    let settings =
+        RelightSettings { shadow_error_m: photo.shadow_error_m, ..RelightSettings::default() };
+    let shot = (&photograph, &located);
+    let relit = match relight(&site, scene, shot, &settings, &job.part(0.0, 0.7)) {
+        Ok(relit) => relit,
+        Err(RelightError::Cancelled(cancelled)) => return Err(cancelled.into()),
+        Err(why) => return Err(because(why)),
+    };
+    let faces = match read_all(
+        &site,
+        scene,
+        (Some(&relit), Some(member)),
+        shot,
+        settings.seed,
+        &job.part(0.7, 1.0),
+    ) {
+        Ok(faces) => faces,
+        Err(MapError::Cancelled(cancelled)) => return Err(cancelled.into()),
+        Err(why) => return Err(because(why)),
+    };
+    let own: Vec<&ReadFace> = faces.iter().collect();
+    let Some(surface) = site.surface(member).filter(|_| !own.is_empty()) else {
+        return Err(because("it shows nothing of the member: give it to one that it shows"));
+    };
+    let seen: f64 = own.iter().flat_map(|f| &f.reading.seen_m2).sum();
+    if seen <= 0.0 {
+        let why = "of what it shows of the member no reflectance is known: shadow, glare, or a view that is too flat";
+        return Err(because(why));
+    }
+    Ok(observations(photo, surface, &own))
+}
+
+/// What was found and what was not, face by face and zone by zone.
+fn observations(photo: &Photographed, surface: &Surface, faces: &[&ReadFace]) -> Vec<Observation> {
+    let length = surface.length();
+    let observation = |name: String, spot: Spot, shows: Shows| Observation {
+        member: photo.member.clone(),
+        name,
+        date: photo.date,
+        spot,
+        instrument: Some("photograph".into()),
+        picture: None,
+        shows,
+    };
+    let mut found = Vec::new();
+    let mut is_marred = [false; ZONES];
+    for face in faces {
+        for defect in &face.reading.defects {
+            let [low, high] = defect.reach_m().map(|m| (m / length).clamp(0.0, 1.0));
+            let shows = shows(defect);
+            if !matches!(shows, Shows::Rust { .. } | Shows::Efflorescence { .. }) {
+                is_marred[zone_at(low)..=zone_at(high)].fill(true);
+            }
+            let spot = Spot {
+                along: [low as f32, high as f32],
+                angle_deg: Some(angle_deg(face, defect) as f32),
+                height_m: None,
+            };
+            let number = found.len() + 1;
+            found.push(observation(
+                format!("{}, {} {number}", photo.name, defect.kind()),
+                spot,
+                shows,
+            ));
+        }
+    }
+    let whole = surface.area_m2() / ZONES as f64;
+    let readings: Vec<&FaceReading> = faces.iter().map(|f| &f.reading).collect();
+    for zone in (0..ZONES).filter(|zone| !is_marred[*zone]) {
+        let seen: f64 = readings.iter().map(|r| r.seen_m2[zone]).sum::<f64>() / whole.max(1e-9);
+        if seen < GLIMPSE {
+            continue;
+        }
+        // The widest of what faces may have kept to themselves.
+        let hidden = readings.iter().filter(|r| r.seen_m2[zone] > 0.0);
+        let limit_mm = hidden.map(|r| r.narrowest_mm.unwrap_or(UNKNOWN_MM)).fold(0.0, f64::max);
+        let at = |k: usize| k as f32 / ZONES as f32;
+        let middle = 0.5 * (at(zone) + at(zone + 1));
+        let spot = Spot { along: [middle; 2], ..Spot::default() };
+        let shows = Shows::Intact { seen: VOUCHED * seen.min(1.0), limit_mm };
+        found.push(observation(format!("{}, zone {}", photo.name, zone + 1), spot, shows));
+    }
+    found
+}
+
+fn shows(defect: &Defect) -> Shows {
+    match defect {
+        Defect::Crack(crack) => Shows::Crack {
+            width_mm: crack.widest_mm,
+            std_error_mm: crack.widest_error_mm,
+            course: crack.course,
+            length_m: Some(crack.length_m),
+        },
+        Defect::Spall { patch, bars_bare } => {
+            Shows::Spall { area_m2: patch.area_m2, depth_mm: None, bars_bare: *bars_bare }
+        }
+        Defect::Rust(patch) => Shows::Rust { area_m2: patch.area_m2 },
+        Defect::Efflorescence(patch) => Shows::Efflorescence { area_m2: patch.area_m2 },
+    }
+}
+
+/// The side of the member that a defect is on, degrees about the axis.
+fn angle_deg(face: &ReadFace, defect: &Defect) -> f64 {
+    match face.seen.face.chart {
+        Chart::Flat(_) => face.seen.middle.angle_deg,
+        Chart::Around(radius) | Chart::Inside(radius) => {
+            (defect.across_m() / radius).to_degrees().rem_euclid(360.0)
+        }
+    }
+}

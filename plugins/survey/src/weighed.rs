@@ -1,0 +1,300 @@
+//! What instruments, cores and eyes say of a member: cover meter, rebound hammer, ultrasound,
+//! strength of cores, half-cell, chloride, carbonation, sounding, and what an inspector saw.
+//!
+//! Whatever speaks of *rust* weighs all that the exposure class leaves open ([`rust`]): the
+//! posterior of one model of corrosion, so that cover, front, potential and crack are not four
+//! opinions but one. What speaks of *concrete* and its *stiffness* is compared with what its class
+//! promises ([`strength`]) or taken by its size ([`findings`]). Every likelihood is a curve with a
+//! source, none a threshold; what no source of ours gives is marked *ours*.
+//!
+//! A reading stands for its zone, and for others the less the farther they are: its likelihood is
+//! raised to the power exp(−r/L), L the profile's length along which damage is alike (power prior,
+//! Ibrahim and Chen 2000).
+
+use std::collections::BTreeMap;
+
+use intrados_mechanics::material::durability::{Bars, Corrosion};
+use intrados_scene::{
+    Scene,
+    structure::{Date, Observation, Shows},
+};
+use intrados_stage::{Estimate, Job, time::DAY};
+use serde_json::json;
+
+use crate::{findings, photographed::PHOTOGRAPHED, rust, strength};
+
+use intrados_damage::{
+    evidence::{Cause, Evidence},
+    grading::Profile,
+    reach::{Field, Word},
+    zone::{ZONES, Zones, middle, place, zone_at},
+};
+use intrados_forecast::{self as forecast, BarsOf, FORECAST, ForecastError};
+
+/// The source name of what instruments and eyes say.
+pub const SURVEY: &str = "survey";
+
+/// How far the course of rust is followed, years.
+const FORECAST_YEARS: f64 = 20.0;
+/// A zone must be told at least so much (the largest power of a likelihood) to be spoken of.
+const HEARD: f64 = 0.1;
+
+/// What came of the observations of a member.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Surveyed {
+    /// What they say together; none where nothing does.
+    pub evidence: Option<Evidence>,
+    /// Those that count for nothing, by their number in the structure, and why.
+    pub unused: BTreeMap<usize, String>,
+}
+
+/// What an observation is called, unique within its member.
+#[must_use]
+pub fn name(observation: &Observation) -> String {
+    format!("{} ({})", observation.name, observation.shows.kind())
+}
+
+/// An observation where it was made, and when.
+struct Placed<'a> {
+    number: usize,
+    shows: &'a Shows,
+    /// Zones that it lies in, from and to.
+    zones: [usize; 2],
+    /// Before the last of them, s.
+    before: f64,
+}
+
+/// What is known of a member whose observations are read.
+struct Site {
+    /// What may attack its bars, or why nobody knows.
+    corrosion: Result<Corrosion, String>,
+    /// By zone.
+    bars: [Vec<Bars>; ZONES],
+    /// Concrete over its outermost steel, m, by zone.
+    outer: [Option<f64>; ZONES],
+    /// Since the attack began, at the time of the last observation, s.
+    age: f64,
+    /// m.
+    length: f64,
+    /// Sides of its section, m.
+    sides: [f64; 2],
+}
+
+impl Site {
+    /// Of a member by itself, before its bars are known.
+    fn new(scene: &Scene, index: usize) -> Self {
+        let member = &scene.members[index];
+        let length = f64::from(member.frame.axis.length()).max(1e-3);
+        let size = (member.bounds[1] - member.bounds[0]).as_dvec3();
+        // Of what lies askew in its box the volume still tells the section.
+        let area = if member.volume > 0.0 { member.volume / length } else { size.x * size.z };
+        let least = size.min_element().min(area.sqrt()).max(1e-3);
+        Self {
+            corrosion: Err("nothing is known of its bars".into()),
+            bars: Default::default(),
+            outer: [None; ZONES],
+            age: 0.0,
+            length,
+            sides: [least, (area / least).max(least)],
+        }
+    }
+
+    fn take(&mut self, known: BarsOf, id: &str) {
+        let BarsOf { corrosion, age, parts } = known;
+        (self.corrosion, self.age) = (corrosion, age);
+        if let Some(part) = parts.into_iter().find(|part| part.id == id) {
+            (self.bars, self.outer) = (part.bars, part.outer);
+        }
+    }
+
+    /// How far an observation is heard in a zone, 0 to 1.
+    fn heard(&self, placed: &Placed, zone: usize, reach_m: f64) -> f64 {
+        let far = |zones: f64| (-zones * self.length / ZONES as f64 / reach_m.max(1e-6)).exp();
+        let [from, to] = placed.zones;
+        far(from.saturating_sub(zone).max(zone.saturating_sub(to)) as f64)
+    }
+}
+
+/// Reads all observations of a member: those of the scene, and those that were made of photographs,
+/// which are numbered after them.
+///
+/// # Errors
+/// The job was cancelled.
+pub fn surveyed(
+    scene: &Scene,
+    index: usize,
+    photographed: &[Observation],
+    profile: &Profile,
+    job: &Job,
+) -> Result<Surveyed, ForecastError> {
+    let member = &scene.members[index];
+    let mut all: Vec<(usize, &Observation)> = of_member(scene, &member.id).collect();
+    let source = if all.is_empty() { PHOTOGRAPHED } else { SURVEY };
+    all.extend((scene.structure.observations.len()..).zip(photographed));
+    let mut said = Said::default();
+    said.unused.extend(all.iter().filter_map(|(number, o)| Some((*number, refusal(o)?))));
+    let placed = placed(&all);
+    let mut site = Site::new(scene, index);
+    if placed.iter().any(|p| rust::speaks(p.shows)) {
+        let model = scene.structure.assembly_of(&member.id).map_or(&member.id, |a| &a.id);
+        match forecast::bars_of(scene, model, &profile.rule, job) {
+            Ok(known) => site.take(known, &member.id),
+            Err(ForecastError::Cancelled) => return Err(ForecastError::Cancelled),
+            Err(ForecastError::Because(why)) => site.corrosion = Err(why),
+        }
+    }
+    let steel = rust::Weighed::new(&site, &placed, profile, &mut said.unused);
+    said.zones.extend(steel.zones());
+    let concrete = strength::Concrete::of(scene, index);
+    said.put(Cause::Stiffness, &strength::stiffness(&concrete, &placed), profile, &site);
+    let strengths = strength::strength(&concrete, &placed);
+    let findings = findings::lost(&site, &placed, &profile.rule);
+    said.put(Cause::Concrete, &together(&strengths, &findings), profile, &site);
+    let heard = |p: &&Placed| !said.unused.contains_key(&p.number);
+    let used: Vec<&Placed> = placed.iter().filter(heard).collect();
+    let Some(mut evidence) = said.evidence(source, basis(&used, &steel)) else {
+        let why = "nothing of it speaks of damage";
+        let all = placed.iter().map(|p| (p.number, why.to_owned()));
+        let mut unused: BTreeMap<usize, String> = all.collect();
+        unused.extend(said.unused);
+        return Ok(Surveyed { evidence: None, unused });
+    };
+    evidence.crack_width_mm = findings::widest(&placed);
+    if let serde_json::Value::Object(details) = json!({
+        "observations": used.len(),
+        "rust": steel.details(&site, &all),
+        "rust_before_the_last_inspection": before_the_last(&site, &placed, profile),
+    }) {
+        evidence.details = details;
+    }
+    Ok(Surveyed { evidence: Some(evidence), unused: said.unused })
+}
+
+/// The observations of a member, with their numbers in the structure.
+pub fn of_member<'a>(
+    scene: &'a Scene,
+    member: &'a str,
+) -> impl Iterator<Item = (usize, &'a Observation)> {
+    scene.structure.observations.iter().enumerate().filter(move |(_, o)| o.member == member)
+}
+
+/// The share of steel that was taken for lost, in the worst zone and as of now, before what was
+/// found last: what has changed since. None of one date alone.
+fn before_the_last(site: &Site, placed: &[Placed], profile: &Profile) -> Option<Estimate> {
+    let earlier: Vec<Placed> =
+        placed.iter().filter(|p| p.before > 0.0).map(|p| Placed { ..*p }).collect();
+    if earlier.is_empty() {
+        return None;
+    }
+    let weighed = rust::Weighed::new(site, &earlier, profile, &mut BTreeMap::new());
+    let (_, zones) = weighed.zones()?;
+    zones.worst().map(|(_, lost)| lost)
+}
+
+/// Why an observation cannot be weighed, before anything is computed: an eye goes over all of a
+/// member, but an instrument is held to one place.
+#[must_use]
+pub fn refusal(observation: &Observation) -> Option<String> {
+    let is_somewhere = observation.spot.is_placed() || findings::is_seen(&observation.shows);
+    (!is_somewhere)
+        .then(|| "nobody says where on the member it was made: add along (0 to 1)".into())
+}
+
+/// Where and how long before the last each was made. Without a date it is as of the last.
+fn placed<'a>(all: &[(usize, &'a Observation)]) -> Vec<Placed<'a>> {
+    let last: Option<Date> = all.iter().filter_map(|(_, o)| o.date).max();
+    let days = |o: &Observation| Some(o.date?.days_until(last?).max(0) as f64);
+    let one = |(number, o): &(usize, &'a Observation)| {
+        let zone = |along: f32| zone_at(f64::from(along));
+        Placed {
+            number: *number,
+            shows: &o.shows,
+            zones: o.spot.along.map(zone),
+            before: days(o).unwrap_or(0.0) * DAY,
+        }
+    };
+    all.iter().filter(|(_, o)| refusal(o).is_none()).map(one).collect()
+}
+
+/// By zone, what is said of a cause.
+type ByZone = [Option<Estimate>; ZONES];
+
+/// Strength that was lost and what has come off or cracked, 1 − Π(1 − d). Where nobody measured
+/// strength, what an eye finds says nothing of it; where nobody looked, what is lost outside is not
+/// known either.
+fn together(strengths: &ByZone, findings: &ByZone) -> ByZone {
+    /// Of concrete of its class, what eyes and hammers miss (ours).
+    const HIDDEN: Estimate = Estimate { value: 0.0, std_error: 0.15 };
+    std::array::from_fn(|zone| match (strengths[zone], findings[zone]) {
+        (None, None) => None,
+        (a, b) => intrados_damage::evidence::all_causes(
+            [a.unwrap_or(HIDDEN), b.unwrap_or(HIDDEN)].into_iter(),
+        ),
+    })
+}
+
+/// What is said so far.
+#[derive(Default)]
+struct Said {
+    zones: BTreeMap<Cause, Zones>,
+    stands: BTreeMap<Cause, [intrados_damage::evidence::Stands; ZONES]>,
+    unused: BTreeMap<usize, String>,
+}
+
+impl Said {
+    /// What is said of a cause in some zones, spread along the member.
+    fn put(&mut self, cause: Cause, said: &ByZone, profile: &Profile, site: &Site) {
+        let field = Field::of(profile, cause, site.length);
+        // A zone's own word counts in full; one that says less than what was expected beforehand
+        // must not leave the zone less known than that.
+        let weighed = |reading: Estimate| match reading.std_error > field.sd {
+            true => {
+                let share = field.sd.powi(2) / (field.sd.powi(2) + reading.std_error.powi(2));
+                let std_error = share.sqrt() * reading.std_error;
+                Estimate { value: share * reading.value, std_error }
+            }
+            false => reading,
+        };
+        let word = |(zone, reading): (usize, &Option<Estimate>)| {
+            Some(Word { along: Some(middle(zone)), reading: weighed((*reading)?), core: zone })
+        };
+        let words: Vec<Word> = said.iter().enumerate().filter_map(word).collect();
+        if words.is_empty() {
+            return;
+        }
+        self.zones.insert(cause, field.zones(&words));
+        self.stands.insert(cause, field.stands(&words));
+    }
+
+    fn evidence(&mut self, source: &'static str, basis: String) -> Option<Evidence> {
+        let mut zones = std::mem::take(&mut self.zones);
+        zones.retain(|_, zones| zones.worst().is_some());
+        let mut evidence = Evidence::new(source, true, zones, basis)?;
+        evidence.stands = std::mem::take(&mut self.stands);
+        if evidence.zones.contains_key(&Cause::Steel) {
+            evidence.includes = vec![(Cause::Steel, FORECAST.to_owned())];
+        }
+        Some(evidence)
+    }
+}
+
+/// One line for people.
+fn basis(used: &[&Placed], steel: &rust::Weighed) -> String {
+    let mut kinds: BTreeMap<&str, usize> = BTreeMap::new();
+    used.iter().for_each(|p| *kinds.entry(p.shows.kind()).or_default() += 1);
+    let list: Vec<String> = kinds.iter().map(|(kind, n)| format!("{n} {kind}")).collect();
+    let mut text = format!("{} observations ({})", used.len(), list.join(", "));
+    if let Some((zone, active)) = steel.worst() {
+        text += &format!(
+            "; bars rust with a probability of {:.0} % at {} of the axis",
+            100.0 * active,
+            place(zone)
+        );
+    }
+    if let Some(power) = steel.tempered() {
+        text += &format!(
+            "; together they are hardly possible by the exposure class, and count by a power of {power:.2}"
+        );
+    }
+    text
+}
