@@ -5,8 +5,6 @@ use intrados_scene::{
     structure::{Action, Measures, Reading, Test},
 };
 
-use crate::{inverse::Datum, rig::Rig};
-
 /// The id of the member that a gauge or a light meter sits on; none where nobody knows it.
 #[must_use]
 pub fn member_of<'s>(scene: &'s Scene, reading: &Reading) -> Option<&'s str> {
@@ -112,28 +110,4 @@ pub fn can_simulate(scene: &Scene, member: usize) -> bool {
         && structure.gauges.iter().any(|g| g.member == member.id);
     let read = structure.readings.iter().any(|r| member_of(scene, r) == Some(&member.id));
     tested && !read && !member.truth.is_empty() && unfelt(scene, &member.id).is_none()
-}
-
-impl Rig {
-    /// Why a reading that [`refusal`] lets pass cannot be inverted all the same.
-    #[must_use]
-    pub fn refusal(&self, reading: &Reading) -> Option<String> {
-        let why = || {
-            "its gauge lies outside of the member: look at its `along`, `angle_deg` and `depth_mm`"
-                .to_owned()
-        };
-        self.datum(reading).is_none().then(why)
-    }
-
-    /// A reading as a datum of this rig; none where it has no such gauge or test.
-    #[must_use]
-    pub fn datum(&self, reading: &Reading) -> Option<Datum> {
-        let gauge = self.gauges.iter().position(|g| g.0 == reading.of)?;
-        let test = self.tests.iter().position(|t| Some(t) == reading.test.as_ref())?;
-        Some(Datum {
-            reading: test * self.gauges.len() + gauge,
-            value: reading.value,
-            std_error: reading.std_error,
-        })
-    }
 }

@@ -432,3 +432,27 @@ fn places(quarters: &[Zone]) -> Vec<String> {
             .collect(),
     }
 }
+
+impl Rig {
+    /// Why a reading that [`refusal`] lets pass cannot be inverted all the same.
+    #[must_use]
+    pub fn refusal(&self, reading: &Reading) -> Option<String> {
+        let why = || {
+            "its gauge lies outside of the member: look at its `along`, `angle_deg` and `depth_mm`"
+                .to_owned()
+        };
+        self.datum(reading).is_none().then(why)
+    }
+
+    /// A reading as a datum of this rig; none where it has no such gauge or test.
+    #[must_use]
+    pub fn datum(&self, reading: &Reading) -> Option<Datum> {
+        let gauge = self.gauges.iter().position(|g| g.0 == reading.of)?;
+        let test = self.tests.iter().position(|t| Some(t) == reading.test.as_ref())?;
+        Some(Datum {
+            reading: test * self.gauges.len() + gauge,
+            value: reading.value,
+            std_error: reading.std_error,
+        })
+    }
+}

@@ -8,7 +8,7 @@
 use intrados_scene::structure::{Course, Shows};
 use intrados_stage::Estimate;
 
-use crate::weighed::{ByZone, Placed, Site};
+use crate::site::{ByZone, Placed, Site};
 use intrados_damage::{grading::GradingRule, zone::ZONES};
 
 /// Depth of an unknown crack as a share of the section, and its deviation.

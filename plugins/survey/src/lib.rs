@@ -5,6 +5,7 @@ pub mod photographed;
 mod rust;
 #[cfg(test)]
 mod simulate;
+mod site;
 mod strength;
 mod weighed;
 

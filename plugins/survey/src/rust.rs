@@ -29,7 +29,7 @@ use intrados_stage::{Estimate, random::Key, time::YEAR};
 use serde_json::json;
 use statrs::distribution::{ContinuousCDF, Normal};
 
-use crate::weighed::{FORECAST_YEARS, HEARD, Placed, Site};
+use crate::site::{FORECAST_YEARS, HEARD, Placed, Site};
 use intrados_damage::{
     evidence::Cause,
     grading::Profile,

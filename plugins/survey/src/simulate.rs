@@ -7,9 +7,10 @@ use intrados_scene::structure::{Course, Electrode, Shows, usual};
 use intrados_stage::{Estimate, random::Key, time::YEAR};
 use statrs::distribution::{Beta, ContinuousCDF, Normal};
 
-use crate::weighed::{
-    Placed, Site, findings,
+use crate::{
+    findings,
     rust::{self, Possible},
+    site::{Placed, Site},
     strength::{self, Concrete},
 };
 use intrados_damage::{

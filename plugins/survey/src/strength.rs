@@ -16,7 +16,7 @@ use intrados_scene::{
 };
 use intrados_stage::Estimate;
 
-use crate::weighed::{ByZone, Placed};
+use crate::site::{ByZone, Placed};
 
 /// Mean strength in a structure over that of the class.
 const IN_STRUCTURE: f64 = 0.85;

@@ -836,4 +836,3 @@ fn kernel(sigma: f32) -> Vec<f32> {
 fn blurred(grid: &Grid<f32>, sigma: f32) -> Grid<f32> {
     grid.convolved(&kernel(sigma), &Job::default())
 }
-}

@@ -1,0 +1,95 @@
+//! A member's observations where they were made, and what is known of the member.
+
+use intrados_damage::zone::{ZONES, zone_at};
+use intrados_forecast::BarsOf;
+use intrados_mechanics::material::durability::{Bars, Corrosion};
+use intrados_scene::{
+    Scene,
+    structure::{Date, Observation, Shows},
+};
+use intrados_stage::{Estimate, time::DAY};
+
+/// How far the course of rust is followed, years.
+pub(super) const FORECAST_YEARS: f64 = 20.0;
+/// A zone must be told at least so much (the largest power of a likelihood) to be spoken of.
+pub(super) const HEARD: f64 = 0.1;
+
+/// By zone, what is said of a cause.
+pub(super) type ByZone = [Option<Estimate>; ZONES];
+
+/// An observation where it was made, and when.
+pub(super) struct Placed<'a> {
+    pub(super) number: usize,
+    pub(super) shows: &'a Shows,
+    /// Zones that it lies in, from and to.
+    pub(super) zones: [usize; 2],
+    /// Before the last of them, s.
+    pub(super) before: f64,
+}
+
+/// What is known of a member whose observations are read.
+pub(super) struct Site {
+    /// What may attack its bars, or why nobody knows.
+    pub(super) corrosion: Result<Corrosion, String>,
+    /// By zone.
+    pub(super) bars: [Vec<Bars>; ZONES],
+    /// Concrete over its outermost steel, m, by zone.
+    pub(super) outer: [Option<f64>; ZONES],
+    /// Since the attack began, at the time of the last observation, s.
+    pub(super) age: f64,
+    /// m.
+    pub(super) length: f64,
+    /// Sides of its section, m.
+    pub(super) sides: [f64; 2],
+}
+
+impl Site {
+    /// Of a member by itself, before its bars are known.
+    pub(super) fn new(scene: &Scene, index: usize) -> Self {
+        let member = &scene.members[index];
+        let length = f64::from(member.frame.axis.length()).max(1e-3);
+        let size = (member.bounds[1] - member.bounds[0]).as_dvec3();
+        // Of what lies askew in its box the volume still tells the section.
+        let area = if member.volume > 0.0 { member.volume / length } else { size.x * size.z };
+        let least = size.min_element().min(area.sqrt()).max(1e-3);
+        Self {
+            corrosion: Err("nothing is known of its bars".into()),
+            bars: Default::default(),
+            outer: [None; ZONES],
+            age: 0.0,
+            length,
+            sides: [least, (area / least).max(least)],
+        }
+    }
+
+    pub(super) fn take(&mut self, known: BarsOf, id: &str) {
+        let BarsOf { corrosion, age, parts } = known;
+        (self.corrosion, self.age) = (corrosion, age);
+        if let Some(part) = parts.into_iter().find(|part| part.id == id) {
+            (self.bars, self.outer) = (part.bars, part.outer);
+        }
+    }
+
+    /// How far an observation is heard in a zone, 0 to 1.
+    pub(super) fn heard(&self, placed: &Placed, zone: usize, reach_m: f64) -> f64 {
+        let far = |zones: f64| (-zones * self.length / ZONES as f64 / reach_m.max(1e-6)).exp();
+        let [from, to] = placed.zones;
+        far(from.saturating_sub(zone).max(zone.saturating_sub(to)) as f64)
+    }
+}
+
+/// Where and how long before the last each was made. Without a date it is as of the last.
+pub(super) fn placed<'a>(all: &[(usize, &'a Observation)]) -> Vec<Placed<'a>> {
+    let last: Option<Date> = all.iter().filter_map(|(_, o)| o.date).max();
+    let days = |o: &Observation| Some(o.date?.days_until(last?).max(0) as f64);
+    let one = |(number, o): &(usize, &'a Observation)| {
+        let zone = |along: f32| zone_at(f64::from(along));
+        Placed {
+            number: *number,
+            shows: &o.shows,
+            zones: o.spot.along.map(zone),
+            before: days(o).unwrap_or(0.0) * DAY,
+        }
+    };
+    all.iter().filter(|(_, o)| refusal(o).is_none()).map(one).collect()
+}
