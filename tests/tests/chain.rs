@@ -5,12 +5,10 @@
 use glam::Vec3;
 use intrados_ct::synthetic::drawn;
 use intrados_damage::{
-    Cause, Evidence, EvidenceSource, Said, Sources, grading::NO_EVIDENCE, verdict::Basis,
-    zone::Zones,
+    Cause, Evidence, EvidenceError, EvidenceSource, Said, Sources, grading::NO_EVIDENCE,
+    verdict::Basis, zone::Zones,
 };
-use intrados_predict::{
-    PredictError, PredictPlugin, PredictSettings, Predicted, Progress, predict,
-};
+use intrados_predict::{PredictPlugin, PredictSettings, Predicted, Progress, predict};
 use intrados_scene::{Damage, Frame, Member, MemberKind, Scene, Slices};
 use intrados_stage::{Estimate, Job};
 

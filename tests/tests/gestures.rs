@@ -12,8 +12,7 @@ use egui::{
 use egui_kittest::{Harness, kittest::Queryable};
 use intrados_light::{LightPlugin, Render};
 use intrados_panels::{Action, Actions, Banners, PanelsPlugin, Window};
-use intrados_predict as predict;
-use intrados_predict::PredictPlugin;
+use intrados_predict::{PredictPlugin, PredictSettings};
 use intrados_scene::{Member, Scene, plugin::install};
 use intrados_stage::{Job, Jobs, Pace, random::Key as Random};
 use intrados_transport::{BATCH, Schedule};
@@ -43,10 +42,7 @@ fn build() -> App {
         intrados_mechanics::MechanicsPlugin,
         intrados_xray::XrayPlugin,
         PredictPlugin {
-            settings: predict::PredictSettings {
-                forecast: None,
-                ..predict::PredictSettings::default()
-            },
+            settings: PredictSettings { forecast: None, ..PredictSettings::default() },
         },
         PanelsPlugin {
             slice: Some(std::time::Duration::from_millis(1)),

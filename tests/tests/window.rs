@@ -23,8 +23,8 @@ use intrados_panels::{
     Action, Actions, AddPanel, Latest, Log, Look, PanelsPlugin, Place, Quantity, Refine, Selection,
     Statistics, Viewpoint, show,
 };
-use intrados_predict as predict;
 use intrados_predict::Progress;
+use intrados_predict::predict;
 use intrados_scene::{CrackSurface, Member, Mouth, SurfaceDamage, plugin::CurrentScene};
 use intrados_stage::{Job, Jobs, Pace, Work};
 use intrados_transport::{BATCH, Schedule, Side, Steering};
@@ -699,7 +699,7 @@ fn an_analysis_can_be_stopped() {
     window.click("⏹ Stop");
     window.until("its end", |w| !w.resource::<Analyses>().is_busy());
     assert!(window.with(|w| matches!(
-        w.resource::<Analyses>().get("C1").map(|a| &a.state),
+        w.resource::<Analyses>().get("C1").map(|a| &a.work),
         Some(Work::Cancelled)
     )));
 }

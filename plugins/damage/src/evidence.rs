@@ -10,7 +10,7 @@ use intrados_stage::{Estimate, Job};
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    error::PredictError,
+    error::EvidenceError,
     zone::{ZONES, Zones},
 };
 
@@ -130,14 +130,16 @@ impl Evidence {
 
 /// Evidence as it is kept between two runs; its source is known to whoever keeps it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Kept {
+pub struct Kept {
     evidence: Evidence,
     /// JSON: of numbers whose types nobody says, RON does not keep every bit.
     details: String,
 }
 
 impl Kept {
-    pub(crate) fn of(evidence: &Evidence) -> Option<Self> {
+    /// None if its details are no JSON.
+    #[must_use]
+    pub fn of(evidence: &Evidence) -> Option<Self> {
         let details = serde_json::to_string(&evidence.details).ok()?;
         Some(Self {
             evidence: Evidence { details: serde_json::Map::new(), ..evidence.clone() },
@@ -145,7 +147,9 @@ impl Kept {
         })
     }
 
-    pub(crate) fn again(self, source: &'static str) -> Option<Evidence> {
+    /// What was kept, of the source that it was of; none if it is damaged.
+    #[must_use]
+    pub fn again(self, source: &'static str) -> Option<Evidence> {
         Some(Evidence {
             source,
             details: serde_json::from_str(&self.details).ok()?,
@@ -156,7 +160,7 @@ impl Kept {
 
 /// What is lost by several causes together, 1 − Π(1 − d), with its error to first order; `None` of
 /// none.
-pub(crate) fn all_causes(causes: impl Iterator<Item = Estimate>) -> Option<Estimate> {
+pub fn all_causes(causes: impl Iterator<Item = Estimate>) -> Option<Estimate> {
     let causes: Vec<Estimate> = causes.collect();
     if let [one] = causes[..] {
         return Some(one);

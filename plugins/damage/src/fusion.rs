@@ -14,9 +14,9 @@
 //! taken together, 1 − Π(1 − d); one that nothing speaks of counts as nothing, with the error that
 //! the profile declares for it.
 
-use intrados_stage::Estimate;
 use std::collections::{BTreeMap, BTreeSet};
 
+use intrados_stage::Estimate;
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
@@ -292,7 +292,7 @@ const ONCE_IN_A_HUNDRED: f64 = 2.326_348;
 
 /// The point of χ² that belongs to a point z of the normal distribution (Wilson and Hilferty 1931;
 /// within 2 %).
-pub(crate) fn chi2_point(freedom: f64, z: f64) -> f64 {
+pub fn chi2_point(freedom: f64, z: f64) -> f64 {
     let a = 2.0 / (9.0 * freedom);
     freedom * (1.0 - a + z * a.sqrt()).powi(3)
 }

@@ -1,15 +1,16 @@
 //! From what is seen in a section to a damage between 0 and 1, and from damage to a state: numbers
 //! that an engineer can edit.
 
-use intrados_stage::{Estimate, access};
 use std::path::Path;
 
+use intrados_ct::crack::Crack;
 use intrados_scene::Scene;
+use intrados_stage::{Estimate, access};
 use serde::{Deserialize, Serialize};
 
-pub use crate::error::ProfileError;
 use crate::{evidence::Evidence, fusion};
-use intrados_ct::crack::Crack;
+
+pub use crate::error::ProfileError;
 
 /// The profile that holds where nobody names another.
 const FOUR_STATES: &str = include_str!("../../../assets/grading/four_states.ron");

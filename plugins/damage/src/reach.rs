@@ -23,26 +23,28 @@ const PLACES: usize = 40;
 
 /// A field along a member's axis.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Field {
+pub struct Field {
     /// Standard deviation of damage where nothing is known.
-    pub(crate) sd: f64,
+    pub sd: f64,
     /// Correlation length as a share of the axis.
-    pub(crate) reach: f64,
+    pub reach: f64,
 }
 
 /// What a slice says, and where it lies on the axis (0 to 1), if anybody knows.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Word {
-    pub(crate) along: Option<f64>,
-    pub(crate) reading: Estimate,
+pub struct Word {
+    /// Place on the axis, 0 to 1.
+    pub along: Option<f64>,
+    /// Damage there.
+    pub reading: Estimate,
     /// Number of its core: slices of one core lie in one place, known or not.
-    pub(crate) core: usize,
+    pub core: usize,
 }
 
 impl Field {
     /// Of a cause on a member `length` m long. A profile that says nothing means what the usual one
     /// says of concrete.
-    pub(crate) fn of(profile: &Profile, cause: Cause, length: f64) -> Self {
+    pub fn of(profile: &Profile, cause: Cause, length: f64) -> Self {
         let sd = profile.fusion.unknown.get(&cause).copied().unwrap_or(0.3);
         let reach = profile.fusion.correlation_m.get(&cause).copied().unwrap_or(0.5);
         Self { sd, reach: reach / length.max(1e-3) }
@@ -72,7 +74,7 @@ impl Field {
     }
 
     /// How far slices stand for their zones, and what others were given beforehand.
-    pub(crate) fn stands(&self, words: &[Word]) -> [Stands; ZONES] {
+    pub fn stands(&self, words: &[Word]) -> [Stands; ZONES] {
         let words = worst(words);
         std::array::from_fn(|zone| match own(&words, zone) {
             Some(own) => Stands { between: self.rest(zone, own), prior: None },
@@ -81,7 +83,7 @@ impl Field {
     }
 
     /// Damage of every zone.
-    pub(crate) fn zones(&self, words: &[Word]) -> Zones {
+    pub fn zones(&self, words: &[Word]) -> Zones {
         let words = worst(words);
         let known = DVector::from_iterator(words.len(), words.iter().map(|w| w.reading.value));
         let noise = |i: usize| (words[i].reading.std_error / self.sd.max(1e-9)).powi(2).max(1e-6);

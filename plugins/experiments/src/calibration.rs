@@ -9,6 +9,10 @@
 
 use std::{collections::BTreeMap, sync::Arc};
 
+use intrados_damage::{evidence::Sources, score::MemberScore};
+use intrados_forecast::Forecast;
+use intrados_gauges as gauges;
+use intrados_predict::{Compared, MemberPrediction, PredictError, PredictSettings, Predictor};
 use intrados_scene::{Damage, Member, Scene, Slices};
 use intrados_stage::{
     Job,
@@ -16,11 +20,6 @@ use intrados_stage::{
     random::{Draw, Key},
 };
 use serde::{Deserialize, Serialize};
-
-use intrados_damage::{evidence::Sources, score::MemberScore};
-use intrados_forecast::Forecast;
-use intrados_gauges as gauges;
-use intrados_predict::{Compared, MemberPrediction, PredictError, PredictSettings, Predictor};
 
 /// Schema of the JSON.
 pub const SCHEMA: &str = "intrados.experiment.calibration/2";

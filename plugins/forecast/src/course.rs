@@ -17,7 +17,7 @@ pub struct GaugeCourse {
 
 impl GaugeCourse {
     /// Strain at an age in days, between those that are known; the nearest beyond them.
-    pub(crate) fn at(&self, day: f64) -> f64 {
+    pub fn at(&self, day: f64) -> f64 {
         let after = self.days.partition_point(|d| *d <= day);
         let (Some(&last), true) = (self.strain.last(), after > 0) else {
             return self.strain.first().copied().unwrap_or_default();

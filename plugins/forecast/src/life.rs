@@ -12,6 +12,11 @@
 use std::collections::BTreeMap;
 
 use glam::{DVec3, Vec3};
+use intrados_damage::{
+    evidence::{Cause, Evidence},
+    grading::GradingRule,
+    zone::{ZONES, Zones, place, together, zone_at},
+};
 use intrados_mechanics::{
     analysis::{MemberOutcome, Observer, analyze, past_peak},
     element::rod::Piece,
@@ -31,12 +36,6 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 
 use crate::{GaugeCourse, Tie, crack_width, width::E_STEEL};
-
-use intrados_damage::{
-    evidence::{Cause, Evidence},
-    grading::GradingRule,
-    zone::{ZONES, Zones, place, together, zone_at},
-};
 
 /// The source name of evidence from the life in finite elements.
 pub const FORECAST: &str = "forecast";
@@ -307,30 +306,30 @@ fn prepared(
 }
 
 /// The bars of a model's members, and what attacks them.
-pub(crate) struct BarsOf {
+pub struct BarsOf {
     /// What may attack them, or why nobody knows.
-    pub(crate) corrosion: Result<Corrosion, String>,
+    pub corrosion: Result<Corrosion, String>,
     /// Since the attack began, now, s.
-    pub(crate) age: f64,
+    pub age: f64,
     /// By member.
-    pub(crate) parts: Vec<PartBars>,
+    pub parts: Vec<PartBars>,
 }
 
 /// The bars of a member, by zone.
-pub(crate) struct PartBars {
+pub struct PartBars {
     /// Its id.
-    pub(crate) id: String,
+    pub id: String,
     /// Along its axis.
-    pub(crate) bars: [Vec<Bars>; ZONES],
+    pub bars: [Vec<Bars>; ZONES],
     /// Concrete over the outermost steel, stirrups too, m.
-    pub(crate) outer: [Option<f64>; ZONES],
+    pub outer: [Option<f64>; ZONES],
 }
 
 /// The bars of a model as a forecast has them.
 ///
 /// # Errors
 /// The model cannot be prepared; or the job was cancelled.
-pub(crate) fn bars_of(
+pub fn bars_of(
     scene: &Scene,
     model: &str,
     rule: &GradingRule,

@@ -1,7 +1,7 @@
 //! Crack width from the stress of steel (EN 1992-1-1, 7.3.4), which does not depend on the mesh.
 
 /// Steel's modulus, Pa (EN 1992-1-1, 3.2.7).
-pub(super) const E_STEEL: f64 = 200e9;
+pub(crate) const E_STEEL: f64 = 200e9;
 /// k_t: load that stays.
 const LASTING: f64 = 0.4;
 

@@ -27,7 +27,7 @@ const OF_LINE: [f64; 2] = [2.0 / 6.0, 1.0 / 6.0];
 
 /// The held nodes of a member.
 #[derive(Debug, Clone)]
-pub(super) struct Grip(Vec<Held>);
+pub(crate) struct Grip(Vec<Held>);
 
 /// The nodes that are held in one direction.
 #[derive(Debug, Clone)]
@@ -39,7 +39,7 @@ struct Held {
 }
 
 impl Grip {
-    pub(super) fn of(rig: &Rig) -> Self {
+    pub(crate) fn of(rig: &Rig) -> Self {
         let held = |component: u8| {
             let nodes: Vec<u32> = rig
                 .model
@@ -57,12 +57,12 @@ impl Grip {
     }
 
     /// How many numbers [`Grip::tractions`] gives.
-    pub(super) fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.0.iter().map(|h| h.unknowns.len()).sum()
     }
 
     /// Whether any of these nodes is held; they are sorted.
-    pub(super) fn holds_any(&self, nodes: &[u32]) -> bool {
+    pub(crate) fn holds_any(&self, nodes: &[u32]) -> bool {
         self.0
             .iter()
             .flat_map(|h| &h.unknowns)
@@ -71,7 +71,7 @@ impl Grip {
 
     /// L⁻¹ R of the forces on all unknowns: their products are what a bedding of 1 Pa/m adds to a
     /// reading.
-    pub(super) fn tractions(&self, force: impl Fn(usize) -> f64) -> Vec<f64> {
+    pub(crate) fn tractions(&self, force: impl Fn(usize) -> f64) -> Vec<f64> {
         let of = |held: &Held| {
             let mut reactions = DVector::from_iterator(
                 held.unknowns.len(),
@@ -89,7 +89,7 @@ impl Grip {
 ///
 /// # Errors
 /// [`Failure`].
-pub(super) fn given(rig: &Rig, linear: &mut Linear) -> Result<Vec<f64>, Failure> {
+pub(crate) fn given(rig: &Rig, linear: &mut Linear) -> Result<Vec<f64>, Failure> {
     let grip = Grip::of(rig);
     let [cases, gauges] = linear.size();
     if grip.len() == 0 {

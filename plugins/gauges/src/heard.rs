@@ -35,7 +35,7 @@ fn unfelt(scene: &Scene, member: &str) -> Option<String> {
 }
 
 /// Why a load test is none that can be inverted.
-pub(super) fn improper(test: &Test) -> Option<String> {
+pub(crate) fn improper(test: &Test) -> Option<String> {
     let acts = |a: &Action| {
         matches!(
             a,

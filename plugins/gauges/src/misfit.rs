@@ -5,7 +5,7 @@ use crate::GaugeReading;
 
 /// How often chance makes χ² larger than what is still believed: once in a thousand, as a point of
 /// the normal distribution.
-pub(super) const ONCE_IN_A_THOUSAND: f64 = 3.090_232;
+pub(crate) const ONCE_IN_A_THOUSAND: f64 = 3.090_232;
 
 /// A unit that somebody may have typed for another: how many times too large the numbers are, and
 /// what they probably are.
@@ -26,7 +26,7 @@ const MOST: f64 = 0.8;
 /// The likely reason, one clause for people. `readings`: of one member, `sound` being what it would
 /// show without damage, and z its distance from the best fit.
 #[must_use]
-pub(super) fn reason(readings: &[GaugeReading]) -> String {
+pub(crate) fn reason(readings: &[GaugeReading]) -> String {
     for unit in ["1", "m"] {
         let Some(times) = median(readings.iter().filter(|r| r.unit == unit)) else { continue };
         let quantity = if unit == "m" { "displacements" } else { "strains" };

@@ -9,6 +9,11 @@
 //! part of what the forecast says.
 
 use glam::{DMat4, DVec4};
+use intrados_damage::{
+    evidence::{Cause, Evidence},
+    zone::{ZONES, Zones, zone_at},
+};
+use intrados_forecast::{Forecast, GaugeCourse};
 use intrados_scene::{
     Scene,
     structure::{Date, Sample, Series},
@@ -19,12 +24,6 @@ use intrados_stage::{
 };
 use serde::Serialize;
 use serde_json::json;
-
-use intrados_damage::{
-    evidence::{Cause, Evidence},
-    zone::{ZONES, Zones, zone_at},
-};
-use intrados_forecast::{Forecast, GaugeCourse};
 
 /// The source name of evidence from monitoring.
 pub const MONITORING: &str = "monitoring";
@@ -74,7 +73,7 @@ pub struct Drift {
 }
 
 /// What the series of a member's gauges say, and why others say nothing: their gauges, and why.
-pub(crate) fn heard(
+pub fn heard(
     scene: &Scene,
     index: usize,
     forecast: &Forecast,
@@ -122,7 +121,7 @@ fn told(drifts: Vec<Drift>, zones: Zones) -> Option<Evidence> {
 }
 
 /// What a series is called in the ledger.
-pub(crate) fn name(series: &Series) -> String {
+pub fn name(series: &Series) -> String {
     let ends = series.samples.first().zip(series.samples.last());
     let span = ends.map_or(String::new(), |(a, b)| format!(", {} to {}", a.date, b.date));
     format!("{} over the years{span} ({} readings)", series.gauge, series.samples.len())
@@ -149,7 +148,7 @@ fn last_date(scene: &Scene) -> Option<Date> {
 /// # Errors
 /// Why it says nothing: too few readings, too short, before the member was there, or hardly any
 /// strain.
-pub(crate) fn drift(
+pub fn drift(
     series: &Series,
     course: &GaugeCourse,
     age_years: f64,

@@ -1,5 +1,10 @@
 //! What readings of gauges say of a member's zones.
 
+use intrados_damage::{
+    evidence::{Cause, Evidence},
+    fusion::chi2_point,
+    zone::Zones,
+};
 use intrados_mechanics::{
     frame::FrameError,
     member::{MemberError, Meshing},
@@ -11,20 +16,14 @@ use intrados_transport::Perturbed;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    Priors, Simulation,
-    heard::refusal,
+    Simulation, grip,
+    heard::{member_of, refusal},
     inverse::{self, Datum, Forward, invert},
     misfit::{self, ONCE_IN_A_THOUSAND},
     reduced::Reduced,
     rig::{FACES, Rig, TENTHS},
     simulate::simulate,
     unknown::{Unknown, unknowns},
-};
-
-use intrados_damage::{
-    evidence::{Cause, Evidence},
-    fusion::chi2_point,
-    zone::Zones,
 };
 
 /// How to invert.

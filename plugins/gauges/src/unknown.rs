@@ -85,7 +85,7 @@ fn springs(rig: &Rig) -> Vec<DVec3> {
 
 /// What is really so in a simulation, drawn by the priors.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Truth {
+pub(crate) struct Truth {
     loads: Vec<f64>,
     give: f64,
 }
@@ -93,7 +93,7 @@ pub(super) struct Truth {
 impl Truth {
     /// Draws, and puts modulus and springs into the rig. A support that holds nodes never gives
     /// less than nothing.
-    pub(super) fn draw(rig: &mut Rig, priors: &Priors, modulus: f64, seed: u64) -> Self {
+    pub(crate) fn draw(rig: &mut Rig, priors: &Priors, modulus: f64, seed: u64) -> Self {
         let dice = |what: u64| Key::new(seed, 0x0ff0 + what).normal(0);
         let modulus = modulus * (priors.modulus * dice(0)).exp();
         for body in &mut rig.model.bodies {
@@ -119,7 +119,7 @@ impl Truth {
     ///
     /// # Errors
     /// [`Failure`](intrados_mechanics::model::Failure).
-    pub(super) fn change(
+    pub(crate) fn change(
         &self,
         rig: &Rig,
         linear: &mut Linear,

@@ -2,18 +2,17 @@
 
 use std::path::PathBuf;
 
+use intrados_ct::Picture;
+use intrados_damage::zone::zone_at;
 use intrados_scene::{
     Scene,
     structure::{Course, Observation, Shows},
 };
 use intrados_stage::Estimate;
+use intrados_survey::{self as survey, SURVEY, photographed::PHOTOGRAPHED};
 use serde::Serialize;
 
-use intrados_ct::Picture;
-
 use crate::{CT, SliceReading, section::widest};
-use intrados_damage::zone::zone_at;
-use intrados_survey::{self as survey, SURVEY, photographed::PHOTOGRAPHED};
 
 /// One thing that is wrong with a member, as somebody found it.
 #[derive(Debug, Clone, PartialEq, Serialize)]

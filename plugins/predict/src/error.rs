@@ -1,6 +1,5 @@
 use intrados_ct::SliceError;
 use intrados_damage::{EvidenceError, grading::ProfileError};
-
 use intrados_stage::{Cancelled, Fault};
 
 /// Why there is no prediction.

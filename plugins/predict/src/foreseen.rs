@@ -1,14 +1,14 @@
 //! What a prediction will not use, before anything is computed.
 
 use intrados_ct::source::SliceSource;
+use intrados_damage::ledger::Item;
+use intrados_gauges::{self as gauges, GAUGES, GaugeError, rig::Rig};
 use intrados_mechanics::member::Meshing;
 use intrados_scene::Scene;
 use intrados_stage::Job;
+use intrados_survey::{self as survey, SURVEY};
 
 use crate::{CT, PredictError};
-use intrados_damage::ledger::Item;
-use intrados_gauges::{self as gauges, GAUGES, GaugeError, rig::Rig};
-use intrados_survey::{self as survey, SURVEY};
 
 /// What a prediction will not use, as far as can be told before anything is computed, each with its
 /// place in the scene file. The rules are those of the prediction itself.

@@ -1,16 +1,24 @@
 #![doc = include_str!("../README.md")]
 
+mod compared;
 mod defect;
 mod error;
 mod foreseen;
+mod limits;
 mod plugin;
+mod prediction;
 mod predictor;
 mod section;
+mod settings;
 
+pub use compared::{Compared, score};
 pub use defect::Defect;
 pub use error::PredictError;
 pub use foreseen::foreseen;
 pub use intrados_ct::source::Origin;
+pub use limits::doubted;
 pub use plugin::{PredictPlugin, Predicted, Predicting, Progress};
-pub use predictor::*;
+pub use prediction::{CrackCheck, MemberPrediction, MissingEvidence, Prediction, SCHEMA, Truth};
+pub use predictor::{Predictor, predict};
 pub use section::{CT, SliceReading, SliceTruth};
+pub use settings::PredictSettings;

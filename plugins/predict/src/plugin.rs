@@ -3,6 +3,12 @@ use std::sync::{Arc, Mutex, PoisonError};
 use bevy_app::{App, Plugin, Update};
 use bevy_ecs::prelude::*;
 use intrados_ct::source::SliceShelf;
+use intrados_damage::{
+    evidence::{AllEvidence, Evidence, Sources},
+    grading::Profile,
+    verdict::{Basis, Verdict},
+    zone::{ZONES, Zones},
+};
 use intrados_scene::{
     Member, Scene,
     plugin::{CurrentScene, SceneIndex},
@@ -10,12 +16,6 @@ use intrados_scene::{
 use intrados_stage::{Cancelled, Estimate, Job, Jobs, Pace, Stage, Task, aside, file::Set};
 
 use crate::{PredictError, PredictSettings, Prediction, Predictor};
-use intrados_damage::{
-    evidence::{AllEvidence, Evidence, Sources},
-    grading::Profile,
-    verdict::{Basis, Verdict},
-    zone::{ZONES, Zones},
-};
 
 /// Predicts the damage of the members of the [`CurrentScene`]: drains the one queue of work that
 /// [`Predictor`] is, with the [`Sources`] of other plugins, and keeps [`Predicted`] up to date. The

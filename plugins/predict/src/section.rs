@@ -2,12 +2,6 @@
 
 use std::collections::BTreeMap;
 
-use intrados_scene::{AxisRuns, Drilled, Scene};
-use intrados_stage::{Estimate, Job};
-use serde::{Deserialize, Serialize};
-use serde_json::json;
-
-use crate::{PredictError, PredictSettings, Prediction, doubted, foreseen, predict};
 use intrados_ct::{
     crack::Crack,
     detect::{self, Detection, Pore},
@@ -24,6 +18,12 @@ use intrados_damage::{
     reach::{Field, Word},
     zone::{ZONES, middle, zone_at},
 };
+use intrados_scene::{AxisRuns, Drilled, Scene};
+use intrados_stage::{Estimate, Job};
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+
+use crate::{PredictError, PredictSettings};
 
 /// The source name of evidence from CT slices.
 pub const CT: &str = "ct";
@@ -39,7 +39,7 @@ pub struct SliceReading {
     pub core: String,
     /// Number of that core among those of the scene.
     #[serde(skip)]
-    pub(super) core_number: usize,
+    pub(crate) core_number: usize,
     /// Place on the member's axis, 0 to 1; none: unknown.
     pub along: Option<f64>,
     /// Where it was drilled, as far as the scene says; none of slices that were made.
@@ -108,7 +108,7 @@ pub struct SliceTruth {
     /// How well pixels and objects were found.
     pub score: Score,
     #[serde(skip)]
-    pub(super) tally: Tally,
+    pub(crate) tally: Tally,
 }
 
 impl SliceReading {
@@ -137,7 +137,7 @@ impl SliceReading {
 
 /// A reading as it is kept between two runs, with what files do not tell of it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(super) struct Kept {
+pub(crate) struct Kept {
     reading: SliceReading,
     core_number: usize,
     table: Vec<Pore>,
@@ -171,7 +171,7 @@ impl From<Kept> for SliceReading {
 const PICTURES: usize = 2;
 
 /// Reads a slice, and says what follows for its section.
-pub(super) fn read(
+pub(crate) fn read(
     source: &SliceSource,
     scene: &Scene,
     settings: &PredictSettings,
@@ -280,7 +280,7 @@ fn floored(damage: Estimate) -> Estimate {
 }
 
 /// The widest of some cracks.
-pub(super) fn widest(cracks: &[Crack]) -> Option<&Crack> {
+pub(crate) fn widest(cracks: &[Crack]) -> Option<&Crack> {
     cracks.iter().max_by(|a, b| a.width_mm.total_cmp(&b.width_mm))
 }
 
@@ -312,7 +312,7 @@ fn side_mm(area_px: usize, pixel_mm: f32) -> f64 {
     (area_px as f64).sqrt() * f64::from(pixel_mm)
 }
 
-pub(super) fn keep_worst_pictures(readings: &mut [SliceReading]) {
+pub(crate) fn keep_worst_pictures(readings: &mut [SliceReading]) {
     let mut order: Vec<usize> =
         (0..readings.len()).filter(|&i| readings[i].pictures.is_some()).collect();
     order.sort_by(|&a, &b| {
@@ -323,7 +323,7 @@ pub(super) fn keep_worst_pictures(readings: &mut [SliceReading]) {
 
 /// Of every zone the slice that stands for it: of those in it the one with most of `value`, or the
 /// nearest. Slices of which nobody knows the place stand for every zone.
-pub(super) fn standing<T: Copy>(
+pub(crate) fn standing<T: Copy>(
     readings: &[SliceReading],
     value: impl Fn(&SliceReading) -> Option<T>,
     damage: impl Fn(T) -> f64,
@@ -369,7 +369,7 @@ const CAUSES: [(Cause, Says); 2] = [
 ];
 
 /// What the slices of a member `length` m long say; `None` if it has none.
-pub(super) fn seen(readings: &[SliceReading], length: f64, profile: &Profile) -> Option<Evidence> {
+pub(crate) fn seen(readings: &[SliceReading], length: f64, profile: &Profile) -> Option<Evidence> {
     let worst = readings.iter().max_by(|a, b| a.whole().value.total_cmp(&b.whole().value))?;
     let porosity = mean_porosity(readings);
     let [drawn, scanned] = [Origin::Drawn, Origin::Scanned]
@@ -440,6 +440,7 @@ mod tests {
     };
 
     use super::*;
+    use crate::{Prediction, doubted, foreseen, predict};
     use intrados_damage::evidence::Sources;
 
     /// Writes a core of 60 mm with a pore of 16 mm, half a millimetre a pixel, which the file may

@@ -1,14 +1,14 @@
 //! Members coloured by damage, for other programs: glTF to look at, VTU to compute with.
 
 use glam::DVec3;
+use intrados_damage::verdict::Basis;
 use intrados_mechanics::write::{Field, Grid};
+use intrados_predict::Prediction;
 use intrados_scene::{Scene, gltf::write_glb_with};
 use intrados_stage::file::{Set, WriteError};
 use serde_json::{Map, Value, json};
 
 use crate::surface::{coloured, facets};
-use intrados_damage::verdict::Basis;
-use intrados_predict::Prediction;
 
 /// Writes `damage.glb` and `damage.vtu`; nothing where no member has a surface.
 pub(super) fn write(

@@ -8,7 +8,9 @@ use std::{
     time::{SystemTime, UNIX_EPOCH},
 };
 
+use intrados_ct::picture::Picture;
 use intrados_light::{LitScene, Render, RenderSettings, Sides, View, scene_rule, tone::Tone};
+use intrados_predict::{MemberPrediction, Prediction};
 use intrados_scene::{Camera, Scene, gltf::Model, import::ImportError};
 use intrados_stage::{Cancelled, Job, file::WriteError};
 
@@ -20,8 +22,6 @@ use crate::{
         radiograph::radiograph,
     },
 };
-use intrados_ct::picture::Picture;
-use intrados_predict::{MemberPrediction, Prediction};
 
 /// Pictures of members in a report; the worst ones.
 const MOST_PICTURES: usize = 12;

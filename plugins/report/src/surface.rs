@@ -4,13 +4,12 @@
 use std::sync::Arc;
 
 use glam::Vec3;
-use intrados_scene::{Material, Mesh, Object, Part, Scene, gltf::Model};
-
 use intrados_damage::{
     verdict::Basis,
     zone::{ZONES, zone_at},
 };
 use intrados_predict::Prediction;
+use intrados_scene::{Material, Mesh, Object, Part, Scene, gltf::Model};
 
 /// Linear grey of what nothing is known of.
 pub const UNKNOWN: Vec3 = Vec3::splat(0.35);

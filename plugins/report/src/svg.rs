@@ -1,6 +1,5 @@
 //! Small drawings for the report, as inline SVG.
 
-use intrados_stage::Estimate;
 use std::fmt::Write;
 
 use intrados_damage::{
@@ -8,6 +7,7 @@ use intrados_damage::{
     zone::{ZONES, middle},
 };
 use intrados_predict::MemberPrediction;
+use intrados_stage::Estimate;
 
 /// Diameters of pores in classes of equal ratio (√2), with axes.
 pub(super) fn histogram(diameters: &[f64]) -> String {

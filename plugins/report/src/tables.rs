@@ -3,14 +3,13 @@
 
 use std::collections::BTreeMap;
 
-use intrados_stage::csv::{Table, number};
-
 use intrados_damage::{
     evidence::Cause,
     zone::{ZONES, Zones},
 };
 use intrados_forecast::FORECAST;
 use intrados_predict::{MemberPrediction, Origin, Prediction};
+use intrados_stage::csv::{Table, number};
 
 /// One row a member.
 #[must_use]

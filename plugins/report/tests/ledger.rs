@@ -5,10 +5,12 @@
 
 use std::{collections::BTreeMap, fs::File, path::Path};
 
-use intrados_damage::{Cause, Evidence, EvidenceSource, Said, Sources, ledger::Item, zone::Zones};
+use intrados_damage::{
+    Cause, Evidence, EvidenceError, EvidenceSource, Said, Sources, ledger::Item, zone::Zones,
+};
 use intrados_forecast as forecast;
 use intrados_gauges::{Simulation, simulate_with};
-use intrados_predict::{PredictError, PredictSettings, foreseen, predict};
+use intrados_predict::{PredictSettings, foreseen, predict};
 use intrados_report::evidence_csv;
 use intrados_scene::{
     Scene,

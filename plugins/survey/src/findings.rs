@@ -5,11 +5,11 @@
 //! has come off or sounds hollow is lost to its depth: the cover's, where nobody measured it (± half
 //! of it). All of that is ours; no code turns a finding into strength.
 
+use intrados_damage::{grading::GradingRule, zone::ZONES};
 use intrados_scene::structure::{Course, Shows};
 use intrados_stage::Estimate;
 
 use crate::site::{ByZone, Placed, Site};
-use intrados_damage::{grading::GradingRule, zone::ZONES};
 
 /// Depth of an unknown crack as a share of the section, and its deviation.
 const DEPTH: [f64; 2] = [0.5, 0.224];
@@ -22,7 +22,7 @@ const LOOKED: f64 = 0.05;
 const UNSEEN: f64 = 0.15;
 
 /// Whether it was found by going over the member.
-pub(super) fn is_seen(shows: &Shows) -> bool {
+pub(crate) fn is_seen(shows: &Shows) -> bool {
     matches!(
         shows,
         Shows::Crack { .. }
@@ -36,7 +36,7 @@ pub(super) fn is_seen(shows: &Shows) -> bool {
 }
 
 /// The widest crack, mm.
-pub(super) fn widest(placed: &[Placed]) -> Option<f64> {
+pub(crate) fn widest(placed: &[Placed]) -> Option<f64> {
     let width = |p: &Placed| match p.shows {
         Shows::Crack { width_mm, .. } => Some(*width_mm),
         _ => None,
@@ -45,7 +45,7 @@ pub(super) fn widest(placed: &[Placed]) -> Option<f64> {
 }
 
 /// By zone, the share of its worst section that carries no more.
-pub(super) fn lost(site: &Site, placed: &[Placed], rule: &GradingRule) -> ByZone {
+pub(crate) fn lost(site: &Site, placed: &[Placed], rule: &GradingRule) -> ByZone {
     std::array::from_fn(|zone| {
         let inside = |p: &&Placed| (p.zones[0]..=p.zones[1]).contains(&zone);
         let found = placed.iter().filter(inside).filter_map(|p| one(site, zone, p.shows, rule));

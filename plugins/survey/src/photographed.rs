@@ -8,6 +8,7 @@
 //!
 //! [`survey`]:
 
+use intrados_damage::zone::{ZONES, zone_at};
 use intrados_photo::{
     Located, Photograph, Prior, Site,
     face::{Chart, Surface},
@@ -23,8 +24,6 @@ use intrados_scene::{
     structure::{Observation, Photographed, Shows, Spot},
 };
 use intrados_stage::{Cancelled, Job};
-
-use intrados_damage::zone::{ZONES, zone_at};
 
 /// The source name of what photographs show, where nobody else looked at the member.
 pub const PHOTOGRAPHED: &str = "photographed";
@@ -52,7 +51,7 @@ pub enum PhotoError {
 
 /// What a photograph is called in the ledger, unique within its member.
 #[must_use]
-pub(crate) fn name(photo: &Photographed) -> String {
+pub fn name(photo: &Photographed) -> String {
     let file = photo.file.file_name().unwrap_or_default().to_string_lossy();
     format!("{} (photograph {file})", photo.name)
 }
@@ -89,7 +88,7 @@ pub fn placed(
 }
 
 /// What a photograph shows of its member.
-pub(crate) fn observed(
+pub fn observed(
     scene: &Scene,
     photo: &Photographed,
     job: &Job,

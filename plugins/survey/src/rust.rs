@@ -23,6 +23,11 @@
 
 use std::collections::BTreeMap;
 
+use intrados_damage::{
+    evidence::Cause,
+    grading::Profile,
+    zone::{ZONES, Zones},
+};
 use intrados_mechanics::material::durability::{Attack, Bars, Corrosion, Other};
 use intrados_scene::structure::{Course, Observation, Shows};
 use intrados_stage::{Estimate, random::Key, time::YEAR};
@@ -30,14 +35,9 @@ use serde_json::json;
 use statrs::distribution::{ContinuousCDF, Normal};
 
 use crate::site::{FORECAST_YEARS, HEARD, Placed, Site};
-use intrados_damage::{
-    evidence::Cause,
-    grading::Profile,
-    zone::{ZONES, Zones},
-};
 
 /// Things that may be; the posterior of three readings that agree still rests on hundreds.
-pub(super) const DRAWS: usize = 8192;
+pub(crate) const DRAWS: usize = 8192;
 /// So many of them the posterior must rest on (Kish's effective number); else all readings count by
 /// a smaller power.
 const LEAST: f64 = 50.0;
@@ -60,14 +60,14 @@ const SEED: u64 = 0x006c_6561_6b73;
 
 /// One of the things that may be.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Possible {
-    pub(super) other: Other,
+pub(crate) struct Possible {
+    pub(crate) other: Other,
     /// Logarithm of its weight before anything is read.
     prior: f64,
 }
 
 /// All that may be of a corrosion, of steel that is `age` (s) old.
-pub(super) fn possible(corrosion: &Corrosion, count: usize, age: f64) -> Vec<Possible> {
+pub(crate) fn possible(corrosion: &Corrosion, count: usize, age: f64) -> Vec<Possible> {
     let is_drawn = |k: usize| k % 4 == 3;
     let one = |(k, other): (usize, Other)| {
         if !is_drawn(k) {
@@ -92,19 +92,19 @@ fn salt_rate(share: f64) -> f64 {
 
 #[cfg(test)]
 impl Possible {
-    pub(super) fn is_unforeseen(&self) -> bool {
+    pub(crate) fn is_unforeseen(&self) -> bool {
         self.other.since.is_some()
     }
 }
 
 /// Whether it says anything of rust.
-pub(super) fn speaks(shows: &Shows) -> bool {
+pub(crate) fn speaks(shows: &Shows) -> bool {
     !matches!(shows, Shows::Rebound { .. } | Shows::Velocity { .. } | Shows::CoreStrength { .. })
         && !matches!(shows, Shows::Crack { course, .. } if *course != Course::Along)
 }
 
 /// All that may be, weighed.
-pub(super) struct Weighed {
+pub(crate) struct Weighed {
     draws: Vec<Possible>,
     /// By zone: weights that sum to one; none where nothing is heard.
     weights: [Option<Vec<f64>>; ZONES],
@@ -116,7 +116,7 @@ pub(super) struct Weighed {
 
 impl Weighed {
     /// Of the readings of a member; those that cannot be weighed become `unused`.
-    pub(super) fn new(
+    pub(crate) fn new(
         site: &Site,
         placed: &[Placed],
         profile: &Profile,
@@ -174,19 +174,19 @@ impl Weighed {
     }
 
     /// Share of the bars' section that is gone, by zone.
-    pub(super) fn zones(&self) -> Option<(Cause, Zones)> {
+    pub(crate) fn zones(&self) -> Option<(Cause, Zones)> {
         let zones = Zones(self.found.map(|found| found.map(|(lost, _)| lost)));
         zones.worst().map(|_| (Cause::Steel, zones))
     }
 
     /// The zone where bars most probably rust, and how probably.
-    pub(super) fn worst(&self) -> Option<(usize, f64)> {
+    pub(crate) fn worst(&self) -> Option<(usize, f64)> {
         let known = self.found.iter().enumerate().filter_map(|(z, f)| Some((z, f.as_ref()?.1)));
         known.reduce(|worst, next| if next.1 > worst.1 { next } else { worst })
     }
 
     /// The power that readings count by where they contradict all that the class leaves open.
-    pub(super) fn tempered(&self) -> Option<f64> {
+    pub(crate) fn tempered(&self) -> Option<f64> {
         (self.power < 0.5).then_some(self.power)
     }
 
@@ -199,7 +199,7 @@ impl Weighed {
     }
 
     /// The course of rust over the dates of the observations and on, for scripts and plots.
-    pub(super) fn details(&self, site: &Site, all: &[(usize, &Observation)]) -> serde_json::Value {
+    pub(crate) fn details(&self, site: &Site, all: &[(usize, &Observation)]) -> serde_json::Value {
         let mut dates: Vec<_> = all.iter().filter_map(|(_, o)| o.date).collect();
         dates.sort_unstable();
         dates.dedup();
@@ -350,7 +350,7 @@ fn chloride(draw: &Other, depths_mm: &[f64], percent: &[f64], error: f64, age: f
 }
 
 /// Probability of rust where a potential (mV against Cu/CuSO₄) was read.
-pub(super) fn rusts(mv: f64, error: f64) -> f64 {
+pub(crate) fn rusts(mv: f64, error: f64) -> f64 {
     // Logistic and normal errors together, by their variances (π²/3 of the scale's square).
     let scale = 34.1_f64.hypot(error * 3f64.sqrt() / std::f64::consts::PI);
     (1.0 / (1.0 + ((mv + 275.0) / scale).exp())).clamp(0.05, 0.95)
@@ -370,13 +370,13 @@ fn along(width: f64, error: f64, rust: f64) -> f64 {
 }
 
 /// A curve that rises from nothing to one about a width, mm; `spread` of its logarithm.
-pub(super) fn half_at(width: f64, half: f64, spread: f64) -> f64 {
+pub(crate) fn half_at(width: f64, half: f64, spread: f64) -> f64 {
     if width <= 0.0 { 0.0 } else { 1.0 / (1.0 + (half / width).powf(1.0 / spread)) }
 }
 
 /// Width of the crack that rust of a bar has driven into its cover, mm (Vidal, Castel and François
 /// 2004, eqs. 3 and 5, for rust all around; Alonso et al. 1998 for the first crack).
-pub(super) fn crack_mm(draw: &Possible, bars: &Bars, age: f64) -> f64 {
+pub(crate) fn crack_mm(draw: &Possible, bars: &Bars, age: f64) -> f64 {
     let (diameter, cover) = (1e3 * bars.diameter, 1e3 * (bars.cover + draw.other.cover).max(0.0));
     let first = 1e-3 * (7.53 + 9.32 * cover / diameter.max(1.0));
     let gone = |depth: f64| {

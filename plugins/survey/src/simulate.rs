@@ -2,6 +2,13 @@
 //! from them holds that truth. The maker knows the truth and draws from distributions; the reader
 //! knows neither, and nothing here is used by it.
 
+use std::collections::BTreeMap;
+
+use intrados_damage::{
+    evidence::Cause,
+    grading::Profile,
+    zone::{ZONES, Zones},
+};
 use intrados_mechanics::material::durability::{Attack, Bars, Corrosion};
 use intrados_scene::structure::{Course, Electrode, Shows, usual};
 use intrados_stage::{Estimate, random::Key, time::YEAR};
@@ -13,12 +20,6 @@ use crate::{
     site::{Placed, Site},
     strength::{self, Concrete},
 };
-use intrados_damage::{
-    evidence::Cause,
-    grading::Profile,
-    zone::{ZONES, Zones},
-};
-use std::collections::BTreeMap;
 
 /// Plantings a kind.
 const PLANTINGS: u64 = 200;

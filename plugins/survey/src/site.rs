@@ -1,51 +1,48 @@
 //! A member's observations where they were made, and what is known of the member.
 
-use intrados_damage::zone::{ZONES, zone_at};
+use intrados_damage::zone::ZONES;
 use intrados_forecast::BarsOf;
 use intrados_mechanics::material::durability::{Bars, Corrosion};
-use intrados_scene::{
-    Scene,
-    structure::{Date, Observation, Shows},
-};
-use intrados_stage::{Estimate, time::DAY};
+use intrados_scene::{Scene, structure::Shows};
+use intrados_stage::Estimate;
 
 /// How far the course of rust is followed, years.
-pub(super) const FORECAST_YEARS: f64 = 20.0;
+pub(crate) const FORECAST_YEARS: f64 = 20.0;
 /// A zone must be told at least so much (the largest power of a likelihood) to be spoken of.
-pub(super) const HEARD: f64 = 0.1;
+pub(crate) const HEARD: f64 = 0.1;
 
 /// By zone, what is said of a cause.
-pub(super) type ByZone = [Option<Estimate>; ZONES];
+pub(crate) type ByZone = [Option<Estimate>; ZONES];
 
 /// An observation where it was made, and when.
-pub(super) struct Placed<'a> {
-    pub(super) number: usize,
-    pub(super) shows: &'a Shows,
+pub(crate) struct Placed<'a> {
+    pub(crate) number: usize,
+    pub(crate) shows: &'a Shows,
     /// Zones that it lies in, from and to.
-    pub(super) zones: [usize; 2],
+    pub(crate) zones: [usize; 2],
     /// Before the last of them, s.
-    pub(super) before: f64,
+    pub(crate) before: f64,
 }
 
 /// What is known of a member whose observations are read.
-pub(super) struct Site {
+pub(crate) struct Site {
     /// What may attack its bars, or why nobody knows.
-    pub(super) corrosion: Result<Corrosion, String>,
+    pub(crate) corrosion: Result<Corrosion, String>,
     /// By zone.
-    pub(super) bars: [Vec<Bars>; ZONES],
+    pub(crate) bars: [Vec<Bars>; ZONES],
     /// Concrete over its outermost steel, m, by zone.
-    pub(super) outer: [Option<f64>; ZONES],
+    pub(crate) outer: [Option<f64>; ZONES],
     /// Since the attack began, at the time of the last observation, s.
-    pub(super) age: f64,
+    pub(crate) age: f64,
     /// m.
-    pub(super) length: f64,
+    pub(crate) length: f64,
     /// Sides of its section, m.
-    pub(super) sides: [f64; 2],
+    pub(crate) sides: [f64; 2],
 }
 
 impl Site {
     /// Of a member by itself, before its bars are known.
-    pub(super) fn new(scene: &Scene, index: usize) -> Self {
+    pub(crate) fn new(scene: &Scene, index: usize) -> Self {
         let member = &scene.members[index];
         let length = f64::from(member.frame.axis.length()).max(1e-3);
         let size = (member.bounds[1] - member.bounds[0]).as_dvec3();
@@ -62,7 +59,7 @@ impl Site {
         }
     }
 
-    pub(super) fn take(&mut self, known: BarsOf, id: &str) {
+    pub(crate) fn take(&mut self, known: BarsOf, id: &str) {
         let BarsOf { corrosion, age, parts } = known;
         (self.corrosion, self.age) = (corrosion, age);
         if let Some(part) = parts.into_iter().find(|part| part.id == id) {
@@ -71,25 +68,9 @@ impl Site {
     }
 
     /// How far an observation is heard in a zone, 0 to 1.
-    pub(super) fn heard(&self, placed: &Placed, zone: usize, reach_m: f64) -> f64 {
+    pub(crate) fn heard(&self, placed: &Placed, zone: usize, reach_m: f64) -> f64 {
         let far = |zones: f64| (-zones * self.length / ZONES as f64 / reach_m.max(1e-6)).exp();
         let [from, to] = placed.zones;
         far(from.saturating_sub(zone).max(zone.saturating_sub(to)) as f64)
     }
-}
-
-/// Where and how long before the last each was made. Without a date it is as of the last.
-pub(super) fn placed<'a>(all: &[(usize, &'a Observation)]) -> Vec<Placed<'a>> {
-    let last: Option<Date> = all.iter().filter_map(|(_, o)| o.date).max();
-    let days = |o: &Observation| Some(o.date?.days_until(last?).max(0) as f64);
-    let one = |(number, o): &(usize, &'a Observation)| {
-        let zone = |along: f32| zone_at(f64::from(along));
-        Placed {
-            number: *number,
-            shows: &o.shows,
-            zones: o.spot.along.map(zone),
-            before: days(o).unwrap_or(0.0) * DAY,
-        }
-    };
-    all.iter().filter(|(_, o)| refusal(o).is_none()).map(one).collect()
 }

@@ -34,17 +34,17 @@ const NUMBERS: std::ops::RangeInclusive<f64> = 15.0..=55.0;
 
 /// What a member's class promises.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Concrete {
+pub(crate) struct Concrete {
     /// Mean strength of cylinders, MPa.
-    pub(super) mean_mpa: f64,
+    pub(crate) mean_mpa: f64,
     /// Of a pulse in sound concrete, m/s.
-    pub(super) velocity: f64,
+    pub(crate) velocity: f64,
     /// Relative error of the strength, and of the velocity, of an assumed class; else 0.
     assumed: [f64; 2],
 }
 
 impl Concrete {
-    pub(super) fn of(scene: &Scene, index: usize) -> Self {
+    pub(crate) fn of(scene: &Scene, index: usize) -> Self {
         let member = &scene.members[index];
         let own = scene.structure.concrete(&member.concrete).map(|c| f64::from(c.fck_mpa) * 1e6);
         let class = member.concrete.parse::<Class>().ok().map(|c| c.fck);
@@ -54,7 +54,7 @@ impl Concrete {
 
     /// Of a class by its name.
     #[cfg(test)]
-    pub(super) fn named(class: &str) -> Self {
+    pub(crate) fn named(class: &str) -> Self {
         Self::of_strength(class.parse::<Class>().unwrap().fck, false)
     }
 
@@ -80,7 +80,7 @@ struct Ratio {
 }
 
 /// Share of the stiffness that is lost, by zone: by velocities, and where cracks make a net.
-pub(super) fn stiffness(concrete: &Concrete, placed: &[Placed]) -> ByZone {
+pub(crate) fn stiffness(concrete: &Concrete, placed: &[Placed]) -> ByZone {
     let velocity = |p: &Placed| match p.shows {
         Shows::Velocity { m_s, std_error_m_s } => {
             let value = (m_s / concrete.velocity).powi(2);
@@ -99,7 +99,7 @@ pub(super) fn stiffness(concrete: &Concrete, placed: &[Placed]) -> ByZone {
 }
 
 /// Share of the strength that is lost, by zone: by cores and rebound numbers.
-pub(super) fn strength(concrete: &Concrete, placed: &[Placed]) -> ByZone {
+pub(crate) fn strength(concrete: &Concrete, placed: &[Placed]) -> ByZone {
     let promised = IN_STRUCTURE * concrete.mean_mpa;
     let shared = |value: f64, more: f64| value * BETWEEN.hypot(concrete.assumed[0]).hypot(more);
     let core = |p: &Placed| match *p.shows {

@@ -13,23 +13,27 @@
 
 use std::collections::BTreeMap;
 
-use intrados_mechanics::material::durability::{Bars, Corrosion};
-use intrados_scene::{
-    Scene,
-    structure::{Date, Observation, Shows},
-};
-use intrados_stage::{Estimate, Job, time::DAY};
-use serde_json::json;
-
-use crate::{findings, photographed::PHOTOGRAPHED, rust, strength};
-
 use intrados_damage::{
     evidence::{Cause, Evidence},
     grading::Profile,
     reach::{Field, Word},
     zone::{ZONES, Zones, middle, place, zone_at},
 };
-use intrados_forecast::{self as forecast, BarsOf, FORECAST, ForecastError};
+use intrados_forecast::{self as forecast, FORECAST, ForecastError};
+use intrados_scene::{
+    Scene,
+    structure::{Date, Observation},
+};
+use intrados_stage::{Estimate, Job, time::DAY};
+use serde_json::json;
+
+use crate::{
+    findings,
+    photographed::PHOTOGRAPHED,
+    rust,
+    site::{ByZone, Placed, Site},
+    strength,
+};
 
 /// The source name of what instruments and eyes say.
 pub const SURVEY: &str = "survey";
@@ -123,6 +127,22 @@ fn before_the_last(site: &Site, placed: &[Placed], profile: &Profile) -> Option<
     let weighed = rust::Weighed::new(site, &earlier, profile, &mut BTreeMap::new());
     let (_, zones) = weighed.zones()?;
     zones.worst().map(|(_, lost)| lost)
+}
+
+/// Where and how long before the last each was made. Without a date it is as of the last.
+fn placed<'a>(all: &[(usize, &'a Observation)]) -> Vec<Placed<'a>> {
+    let last: Option<Date> = all.iter().filter_map(|(_, o)| o.date).max();
+    let days = |o: &Observation| Some(o.date?.days_until(last?).max(0) as f64);
+    let one = |(number, o): &(usize, &'a Observation)| {
+        let zone = |along: f32| zone_at(f64::from(along));
+        Placed {
+            number: *number,
+            shows: &o.shows,
+            zones: o.spot.along.map(zone),
+            before: days(o).unwrap_or(0.0) * DAY,
+        }
+    };
+    all.iter().filter(|(_, o)| refusal(o).is_none()).map(one).collect()
 }
 
 /// Why an observation cannot be weighed, before anything is computed: an eye goes over all of a

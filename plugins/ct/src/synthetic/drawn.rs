@@ -8,16 +8,15 @@
 //! more than .08 darker than the matrix.
 
 use glam::Vec3;
+use intrados_raster::grid::{Grid, Mask};
 use intrados_scene::{Damage, Frame, Member, Object, Part, Scene};
 use intrados_stage::{
     Job,
     random::{Draw, Key},
 };
 use intrados_xray::specimen::concrete::wander;
-use rayon::prelude::*;
 
 use crate::{crack::Crack, slice::Slice};
-use intrados_raster::grid::{Grid, Mask};
 
 /// What marks a drawn slice wherever a user sees it.
 pub const MARK: &str = "drawn, not scanned";

@@ -9,7 +9,6 @@ use intrados_transport::{
     BATCH, Field, Process, STEERED_COST, Schedule, Scores, Side, Steering, WalkRule, Walked,
     alternate, watch,
 };
-
 use rayon::prelude::*;
 
 use super::{

@@ -10,18 +10,18 @@ mod source;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use bevy_ecs::prelude::*;
+use draw::Overlay;
 use egui::{ComboBox, Rect, Slider, TextureHandle, TextureOptions, Ui, pos2};
 use intrados_ct::{detect::Method, source::SliceShelf};
 use intrados_predict::Predicting;
 use intrados_scene::{Member, Scene, plugin::CurrentScene};
 use intrados_stage::{Estimate, Jobs, Task};
 use intrados_xray::plugin::{Scan, Scans};
-
-use crate::{Actions, Selection, members};
-use draw::Overlay;
 use picture::View;
 use plots::Order;
 use source::{Read, Source};
+
+use crate::{Actions, Selection, members};
 
 /// Width of what stands beside the slice, points.
 const ASIDE: f32 = 290.0;

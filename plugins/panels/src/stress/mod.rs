@@ -25,13 +25,13 @@ use intrados_stage::{
     Jobs, Task, Work,
     time::{DAY, YEAR},
 };
+use quantity::Quantity;
 
 use crate::{
     Actions, Log, Selection, colours, members,
     number::significant,
     surface::{self, Drawn, Surface, bounds, hand, place},
 };
-use quantity::Quantity;
 
 /// Share of the member's size that its largest displacement is shown as.
 const SHOWN: f32 = 0.05;

@@ -16,6 +16,7 @@ use intrados_scene::{
     structure::{Date, Georeference},
 };
 use serde_json::json;
+use view::{View, surface, view};
 use zip::{CompressionMethod, DateTime, ZipWriter, write::SimpleFileOptions};
 
 use crate::{
@@ -24,7 +25,6 @@ use crate::{
         NOTHING, bad_probability, defect, due, finding, level, matters, metres, word, worse_half,
     },
 };
-use view::{View, surface, view};
 
 /// An edition of the format.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]

@@ -1,5 +1,3 @@
-use intrados_stage::cpu_seconds;
-
 use super::{MatrixField, MatrixProblem, MatrixSample, MatrixStates, SteeredMatrix};
 use crate::{
     Estimator, Scores, Side, Tally, WalkObserver, WalkRule,

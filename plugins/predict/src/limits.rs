@@ -1,0 +1,143 @@
+//! What a prediction does not say, and what in a scene is doubtful before any work is done.
+
+use intrados_ct::{
+    source::SliceSource,
+    synthetic::{drawn::MARK, scanned},
+};
+use intrados_damage::{
+    ledger,
+    verdict::{Basis, NAMED},
+};
+use intrados_forecast::FORECAST;
+use intrados_scene::{Scene, structure::Matter};
+
+use crate::{Origin, prediction::MemberPrediction};
+
+/// Slices of files whose own tags contradict what the scene says of their pixels: place in the
+/// scene, and what they say.
+#[must_use]
+pub fn doubted(scene: &Scene) -> Vec<(String, String)> {
+    let doubt = |slice: SliceSource| {
+        Some((
+            format!("slices of {}, {}", scene.members[slice.member].id, slice.core),
+            slice.doubt()?,
+        ))
+    };
+    SliceSource::all(scene).into_iter().filter_map(doubt).collect()
+}
+
+pub(crate) fn limits(
+    scene: &Scene,
+    members: &[MemberPrediction],
+    items: &[ledger::Item],
+) -> Vec<String> {
+    let mut limits = vec![
+        "Damage is the share of strength lost in the worst zone (a tenth of the length). Of a zone without a slice of its own the others speak as far as the grading profile's correlation lengths reach, with an error that grows.".to_owned(),
+        "Slices show pores and cracks, and where they show the whole section what has fallen off and how much of its bars is left; they do not show lost stiffness, nor what lies between them. A forecast knows of loads and chlorides, not of bad workmanship; gauges feel stiffness, not strength. The error bars allow for that by what the grading profile declares.".to_owned(),
+        "The rule that turns sections into damage is the profile's, and is not part of the error bars.".to_owned(),
+        "Cracks that run through large voids or honeycomb, or are much narrower than a third of a pixel, are missed; a gap along a bar counts as a crack.".to_owned(),
+        "Forecasts are made on coarse elements; widths of foretold cracks are those of EN 1992-1-1, 7.3.4, where bars run along the member.".to_owned(),
+    ];
+    if scene.structure.bears_as_one() {
+        limits.push("Members hand loads on as an elastic frame of whole sections does: what cracks and hands its load to others, and what falls, is not foretold.".to_owned());
+    }
+    let silent = members.iter().filter(|m| m.damage.is_none()).count();
+    if silent > 0 {
+        limits.insert(
+            0,
+            format!(
+                "{silent} of {} members have no evidence: that is not the same as sound.",
+                members.len()
+            ),
+        );
+    }
+    let unmeasured = members.iter().filter(|m| m.basis == Basis::Foretold).count();
+    if unmeasured > 0 {
+        limits.insert(
+            0,
+            format!("Of {unmeasured} members nothing was measured: their damage is foretold only."),
+        );
+    }
+    let unused = items.iter().filter(|i| !i.used).count();
+    if unused > 0 {
+        limits.insert(
+            0,
+            format!(
+                "{unused} of {} items of evidence were not used; the ledger says why.",
+                items.len()
+            ),
+        );
+    }
+    let doubts: Vec<&str> =
+        members.iter().flat_map(|m| &m.slices).filter_map(|s| s.doubt.as_deref()).collect();
+    if let Some(first) = doubts.first() {
+        limits.insert(
+            0,
+            format!("Of {} slices the size of a pixel is in doubt: {first}.", doubts.len()),
+        );
+    }
+    limits.splice(0..0, limits_of_states(members));
+    let assumed_steel =
+        |m: &&MemberPrediction| scene.structure.assembly_of(&m.id).is_some_and(|a| a.steel_assumed);
+    let assumed = [
+        ("concrete", members.iter().filter(|m| m.concrete_assumed).count()),
+        ("reinforcement", members.iter().filter(assumed_steel).count()),
+    ];
+    for (what, count) in assumed.into_iter().filter(|(_, count)| *count > 0) {
+        limits.insert(0, format!("The {what} of {count} of {} members is assumed.", members.len()));
+    }
+    let unpredicted = members.iter().filter(|m| m.damage.is_none() && m.truth.is_some()).count();
+    if unpredicted > 0 {
+        limits.insert(0, format!("Of {unpredicted} members the truth is known but nothing was predicted; they are not part of the score."));
+    }
+    let made = |origin: Origin| members.iter().flat_map(|m| &m.slices).any(|r| r.origin == origin);
+    if made(Origin::Scanned) {
+        limits.insert(0, format!("Some slices are {}: X-rays through the planted truth, with scatter, hardening, noise and their corrections, but with concrete of this program's making.", scanned::MARK));
+    }
+    if made(Origin::Drawn) {
+        limits.insert(0, format!("Some slices are {MARK}: pictures made from the planted truth. Their scores show that the chain works, not how it would do in the field."));
+    }
+    limits
+}
+
+/// What the error bar leaves open, and what of rust is assumed or not computed.
+fn limits_of_states(members: &[MemberPrediction]) -> Vec<String> {
+    let told = |m: &MemberPrediction| {
+        m.evidence.get(FORECAST).and_then(|e| e.details.get("rust").cloned()).unwrap_or_default()
+    };
+    let count = |is: &dyn Fn(&MemberPrediction) -> bool| members.iter().filter(|m| is(m)).count();
+    let undecided = count(&|m| {
+        m.basis == Basis::Measured && m.state_run.is_some_and(|[best, worst]| best < worst)
+    });
+    let unknown = count(&|m| told(m)["computed"] == false);
+    let assumed = count(&|m| told(m)["assumed"].as_array().is_some_and(|a| !a.is_empty()));
+    let lines = [
+        (
+            assumed,
+            format!(
+                "Rust of {assumed} members is foretold by values assumed for their exposure class, which are in predict.json; their spread is in the error."
+            ),
+        ),
+        (
+            unknown,
+            format!(
+                "Rust of bars is not computed for {unknown} members (their forecasts say why): that is not the same as none."
+            ),
+        ),
+        (
+            undecided,
+            format!(
+                "Of {undecided} members the error bar leaves open which state they are in: none has a probability of {NAMED}."
+            ),
+        ),
+    ];
+    lines.into_iter().filter(|(n, _)| *n > 0).map(|(_, line)| line).collect()
+}
+
+/// What a member is of, for people.
+pub(crate) fn of_what(concrete: &str, matter: Option<&Matter>) -> String {
+    match matter {
+        Some(matter) => format!("{}, computed as {concrete}", matter.name),
+        None => concrete.to_owned(),
+    }
+}

@@ -1,0 +1,638 @@
+//! The main job: everything known about a member becomes one damage with an error bar and a state,
+//! and a score where the truth is known.
+//!
+//! [`Predictor`] works piece by piece (a slice, a member's life), so that a window can show it
+//! between frames; [`predict`] runs it to the end.
+
+mod together;
+
+use std::collections::BTreeMap;
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+use intrados_ct::{
+    SliceError,
+    source::{SliceShelf, SliceSource},
+};
+use intrados_damage::{
+    EvidenceError,
+    evidence::{self, Evidence, EvidenceSource, Said, Sources},
+    grading::Profile,
+    ledger,
+};
+use intrados_forecast as forecast;
+use intrados_forecast::{FORECAST, Forecast, ForecastError, forecast};
+use intrados_gauges as gauges;
+use intrados_gauges::{GAUGES, GaugeError, GaugeReading, monitoring};
+use intrados_mechanics::frame;
+use intrados_scene::{Assembly, Scene, structure::Observation};
+use intrados_stage::{Cancelled, Job, file::Set};
+use intrados_survey as survey;
+use intrados_survey::{
+    SURVEY, Surveyed,
+    photographed::{self, PHOTOGRAPHED, PhotoError},
+    surveyed,
+};
+use rayon::prelude::*;
+use serde::Deserialize;
+use serde::Serialize;
+
+use crate::{
+    CT, Origin, PredictError, PredictSettings, SliceReading,
+    compared::score,
+    limits::limits,
+    prediction::{MemberPrediction, MissingEvidence, Prediction, SCHEMA},
+    section,
+};
+
+use together::{Gathered, part_of};
+
+/// Work that goes on piece by piece.
+#[derive(Debug, Clone)]
+pub struct Predictor {
+    settings: PredictSettings,
+    /// Scans that somebody has ordered already.
+    shelf: SliceShelf,
+    hash: String,
+    queue: Vec<Item>,
+    next: usize,
+    readings: Vec<Vec<SliceReading>>,
+    /// Lengths of the members, m.
+    lengths: Vec<f64>,
+    /// What people call assemblies, by their ids.
+    names: BTreeMap<String, String>,
+    told: Vec<(usize, Evidence)>,
+    /// Of every piece done, why it came to nothing; none where it did not.
+    fates: Vec<Option<String>>,
+    /// Readings that could not be inverted, by their number, and why.
+    unfelt: BTreeMap<usize, String>,
+    /// Gauges whose series say nothing, and why.
+    unmonitored: BTreeMap<String, String>,
+    /// What gauges read, by member.
+    measured: BTreeMap<usize, Vec<GaugeReading>>,
+    /// What photographs show, by member.
+    photographed: BTreeMap<usize, Vec<Observation>>,
+    /// Observations that count for nothing, by their number, and why.
+    unheard: BTreeMap<usize, String>,
+    /// Items of outside sources that count for nothing, by piece and number, and why.
+    unused: BTreeMap<(usize, usize), String>,
+    /// By model, the lives that have been computed.
+    lives: BTreeMap<String, Vec<Forecast>>,
+    /// What every member's rest does to it, once a life has asked for it; or why nobody knows.
+    frame: Option<Result<Option<frame::Whole>, String>>,
+}
+
+/// What a piece of work came to, as it is kept between two runs.
+#[derive(Default, Serialize, Deserialize)]
+struct Done {
+    fate: Option<String>,
+    slice: Option<section::Kept>,
+    evidence: Option<evidence::Kept>,
+    unused: BTreeMap<usize, String>,
+    gauges: Vec<GaugeReading>,
+}
+
+/// One piece of work.
+#[derive(Debug, Clone)]
+enum Item {
+    Slice(SliceSource),
+    Life(String),
+    Gauges(usize),
+    /// A photograph of a member, by their numbers.
+    Photograph(usize, usize),
+    /// What instruments and eyes found on a member.
+    Survey(usize),
+    /// What an outside source has of a member, by its names.
+    Outside(Arc<dyn EvidenceSource>, usize, Vec<String>),
+}
+
+impl Item {
+    /// Roughly how long it takes, in slices: for the share of work done.
+    fn weight(&self) -> f64 {
+        match self {
+            Self::Slice(slice) if slice.origin() == Origin::Scanned => 40.0,
+            Self::Slice(_) | Self::Outside(..) => 1.0,
+            Self::Gauges(_) | Self::Survey(_) => 5.0,
+            Self::Photograph(..) => 40.0,
+            Self::Life(_) => 30.0,
+        }
+    }
+}
+
+impl Predictor {
+    /// Lists what is to be done: slices first, then lives, gauges, and what outside `sources`
+    /// bring.
+    #[must_use]
+    pub fn new(scene: &Scene, settings: PredictSettings, sources: &Sources) -> Self {
+        let mut queue: Vec<Item> = SliceSource::all(scene).into_iter().map(Item::Slice).collect();
+        if settings.forecast.is_some() {
+            queue.extend(forecast::models(scene).into_iter().map(Item::Life));
+        }
+        let readable =
+            scene.structure.readings.iter().filter(|r| gauges::refusal(scene, r).is_none());
+        let read: BTreeSet<&str> = readable.filter_map(|r| gauges::member_of(scene, r)).collect();
+        let felt = |&i: &usize| {
+            read.contains(scene.members[i].id.as_str()) || gauges::can_simulate(scene, i)
+        };
+        queue.extend((0..scene.members.len()).filter(felt).map(Item::Gauges));
+        let photographs =
+            scene.structure.photographs.iter().enumerate().filter_map(|(k, p)| {
+                Some((k, scene.members.iter().position(|m| m.id == p.member)?))
+            });
+        let photographs: Vec<(usize, usize)> = photographs.collect();
+        queue.extend(photographs.iter().map(|(k, member)| Item::Photograph(*k, *member)));
+        let is_surveyed = |&i: &usize| {
+            survey::of_member(scene, &scene.members[i].id).next().is_some()
+                || photographs.iter().any(|(_, member)| *member == i)
+        };
+        queue.extend((0..scene.members.len()).filter(is_surveyed).map(Item::Survey));
+        for source in &sources.0 {
+            let items = (0..scene.members.len())
+                .map(|i| (i, source.items(scene, i)))
+                .filter(|(_, items)| !items.is_empty());
+            queue.extend(items.map(|(i, items)| Item::Outside(Arc::clone(source), i, items)));
+        }
+        let readings = vec![Vec::new(); scene.members.len()];
+        let lengths = scene.members.iter().map(|m| f64::from(m.frame.axis.length())).collect();
+        let name = |a: &Assembly| (a.id.clone(), scene.name_of(&a.id).to_owned());
+        let names = scene.structure.assemblies.iter().map(name).collect();
+        Self {
+            settings,
+            shelf: SliceShelf::default(),
+            hash: scene.hash.clone(),
+            queue,
+            next: 0,
+            readings,
+            lengths,
+            names,
+            told: Vec::new(),
+            fates: Vec::new(),
+            unfelt: BTreeMap::new(),
+            unmonitored: BTreeMap::new(),
+            measured: BTreeMap::new(),
+            photographed: BTreeMap::new(),
+            unheard: BTreeMap::new(),
+            unused: BTreeMap::new(),
+            lives: BTreeMap::new(),
+            frame: None,
+        }
+    }
+
+    /// Takes ordered scans from a shelf that others use, too, and puts them there.
+    #[must_use]
+    pub(crate) fn with_shelf(self, shelf: SliceShelf) -> Self {
+        Self { shelf, ..self }
+    }
+
+    /// The lives that have been computed, by assembly.
+    #[must_use]
+    pub fn known_lives(&self) -> &BTreeMap<String, Vec<Forecast>> {
+        &self.lives
+    }
+
+    /// Takes lives that are known already, as of the same assemblies with other damage: they are
+    /// not computed again.
+    pub fn learn_lives(&mut self, lives: BTreeMap<String, Vec<Forecast>>) {
+        self.lives.extend(lives);
+    }
+
+    /// The grading profile that it judges by.
+    #[must_use]
+    pub fn profile(&self) -> &Profile {
+        &self.settings.profile
+    }
+
+    /// Pieces done, and pieces in all.
+    #[must_use]
+    pub fn progress(&self) -> (usize, usize) {
+        (self.next, self.queue.len())
+    }
+
+    /// What comes next, for people.
+    #[must_use]
+    pub fn label(&self) -> String {
+        let slices = self.queue.iter().filter(|i| matches!(i, Item::Slice(_))).count();
+        match self.queue.get(self.next) {
+            Some(Item::Slice(slice)) if slice.origin() == Origin::Scanned => {
+                format!("scanning slice {} of {slices}", self.next + 1)
+            }
+            Some(Item::Slice(_)) => format!("reading slice {} of {slices}", self.next + 1),
+            Some(Item::Life(_)) => self.label_of(&self.lives()),
+            Some(Item::Gauges(_)) => "what gauges felt".into(),
+            Some(Item::Survey(_)) => "what was surveyed".into(),
+            Some(Item::Photograph(..)) => "what a photograph shows".into(),
+            Some(Item::Outside(source, ..)) => format!("what {} says", source.name()),
+            None => String::new(),
+        }
+    }
+
+    /// What people call the lives of some models.
+    fn label_of(&self, models: &[String]) -> String {
+        let name = |id: &String| self.names.get(id).unwrap_or(id).clone();
+        format!("the life of {}", models.iter().map(name).collect::<Vec<_>>().join(" and "))
+    }
+
+    /// Whether all slices of a member have been read and it had any.
+    #[must_use]
+    pub(crate) fn is_read(&self, member: usize) -> bool {
+        let waits = |item: &Item| matches!(item, Item::Slice(slice) if slice.member == member);
+        self.readings.get(member).is_some_and(|r| !r.is_empty())
+            && !self.queue[self.next..].iter().any(waits)
+    }
+
+    /// The models whose lives come next, side by side: as many as there are threads, since one
+    /// alone leaves some idle.
+    fn lives(&self) -> Vec<String> {
+        let waiting = self.queue[self.next..].iter().map_while(|item| {
+            if let Item::Life(model) = item { Some(model.clone()) } else { None }
+        });
+        waiting.take(rayon::current_num_threads().max(1)).collect()
+    }
+
+    /// Does the next piece of work, or several lives at once. `false` once all is done.
+    ///
+    /// # Errors
+    /// A slice is missing or bad, or the job was cancelled. The piece is skipped by calling again.
+    pub fn advance(&mut self, scene: &Scene, job: &Job) -> Result<bool, PredictError> {
+        let Some(item) = self.queue.get(self.next).cloned() else { return Ok(false) };
+        if scene.hash != self.hash || scene.members.len() != self.readings.len() {
+            return Err(PredictError::Changed);
+        }
+        let weight = |items: &[Item]| items.iter().map(Item::weight).sum::<f64>();
+        let (before, whole) = (weight(&self.queue[..self.next]), weight(&self.queue));
+        let lives = self.lives();
+        let taken = lives.len().max(1);
+        let job = job.part(
+            before / whole,
+            (before + weight(&self.queue[self.next..self.next + taken])) / whole,
+        );
+        job.relabel(self.label());
+        job.step(0, 1)?;
+        self.next += taken;
+        self.fates.resize(self.next, None);
+        let done = match item {
+            Item::Slice(slice) => self.look(scene, &slice, &job),
+            Item::Life(_) => self.foretell(scene, &lives, &job),
+            Item::Gauges(member) => self.feel(scene, member, &job),
+            Item::Survey(member) => self.survey(scene, member, &job),
+            Item::Photograph(photo, member) => self.behold(scene, photo, member, &job),
+            Item::Outside(source, member, _) => self.ask(scene, source.as_ref(), member, &job),
+        };
+        if let Err(why) = &done {
+            self.fates[self.next - taken..].fill(Some(why.to_string()));
+        }
+        done.map(|()| self.next < self.queue.len())
+    }
+
+    /// Reads a slice. One that cannot be read is no reason to say nothing of all the rest.
+    fn look(&mut self, scene: &Scene, slice: &SliceSource, job: &Job) -> Result<(), PredictError> {
+        match section::read(slice, scene, &self.settings, &self.shelf, job) {
+            Ok(reading) => {
+                let readings = &mut self.readings[slice.member];
+                readings.push(reading);
+                section::keep_worst_pictures(readings);
+            }
+            Err(PredictError::Slice(why))
+                if (matches!(why, SliceError::Scan(_))
+                    || !self.settings.strict && why.is_of_the_slice())
+                    && !job.is_cancelled() =>
+            {
+                self.fates[self.next - 1] = Some(why.to_string());
+            }
+            Err(other) => return Err(other),
+        }
+        Ok(())
+    }
+
+    /// Passes over the next piece and remembers why.
+    pub(crate) fn skip(&mut self, why: &str) {
+        self.next = (self.next + 1).min(self.queue.len());
+        self.fates.resize(self.next, Some(why.to_owned()));
+    }
+
+    /// Lives side by side, which know nothing of each other; what they tell is kept in their order.
+    fn foretell(
+        &mut self,
+        scene: &Scene,
+        models: &[String],
+        job: &Job,
+    ) -> Result<(), PredictError> {
+        let Some(settings) = self.settings.forecast else { return Ok(()) };
+        let rule = &self.settings.profile.rule;
+        // Of several at once the first tells how far they are.
+        let part = |k: usize| if k == 0 { job.part(0.0, 1.0) } else { job.part(0.0, 0.0) };
+        if self.frame.is_none() && models.iter().any(|model| !self.lives.contains_key(model)) {
+            let found = frame::joined(scene, job);
+            job.step(0, 1)?;
+            self.frame = Some(found.map_err(|why| why.to_string()));
+            job.relabel(self.label_of(models));
+        }
+        let (known, frame) = (&self.lives, &self.frame);
+        let life = |(k, model): (usize, &String)| {
+            if let Some(known) = known.get(model) {
+                return Ok(known.clone());
+            }
+            let (handed, note) = part_of(frame, model);
+            let mut told = forecast(scene, model, handed, rule, settings, &part(k))?;
+            told.iter_mut().for_each(|one| one.notes.extend(note.clone()));
+            Ok(told)
+        };
+        let lives: Vec<_> = models.par_iter().enumerate().map(life).collect();
+        let first = self.next - models.len();
+        // Of several that are cancelled some may be at their end, and those are known.
+        let known = models
+            .iter()
+            .zip(&lives)
+            .filter_map(|(model, told)| Some((model.clone(), told.as_ref().ok()?.clone())));
+        self.lives.extend(known);
+        for (k, told) in lives.into_iter().enumerate() {
+            let told = match told {
+                Ok(told) => told,
+                Err(ForecastError::Cancelled) => return Err(Cancelled.into()),
+                Err(ForecastError::Because(why)) => {
+                    self.fates[first + k] = Some(why);
+                    continue;
+                }
+            };
+            for one in told {
+                let Some(index) = scene.members.iter().position(|m| m.id == one.id) else {
+                    continue;
+                };
+                let (monitored, unused) = monitoring::heard(scene, index, &one);
+                self.unmonitored.extend(unused);
+                let foretold = one.evidence(self.settings.profile.forecast_error);
+                self.told.extend(foretold.into_iter().chain(monitored).map(|e| (index, e)));
+            }
+        }
+        Ok(())
+    }
+
+    /// Inverts the site's readings; where nobody read any, readings made from the planted truth,
+    /// and says so.
+    fn feel(&mut self, scene: &Scene, member: usize, job: &Job) -> Result<(), PredictError> {
+        let settings = gauges::GaugeSettings::default();
+        let found = if gauges::can_simulate(scene, member) {
+            gauges::felt_simulated(scene, member, &self.settings.simulation, &settings, job)
+        } else {
+            gauges::from_gauges(scene, member, &settings, job)
+        };
+        match found {
+            Ok(Some(felt)) => {
+                self.unfelt.extend(felt.unused.iter().cloned());
+                self.fates[self.next - 1] = felt.refused.clone();
+                self.told.extend(felt.evidence().map(|e| (member, e)));
+                self.measured.insert(member, felt.readings);
+            }
+            Ok(None) => {
+                self.fates[self.next - 1] = Some("none of its gauges lies on the member".into())
+            }
+            Err(GaugeError::Cancelled(cancelled)) => return Err(cancelled.into()),
+            Err(_) if job.is_cancelled() => return Err(Cancelled.into()),
+            Err(why) => self.fates[self.next - 1] = Some(why.to_string()),
+        }
+        Ok(())
+    }
+
+    /// Reads what a photograph shows of its member.
+    fn behold(
+        &mut self,
+        scene: &Scene,
+        photo: usize,
+        member: usize,
+        job: &Job,
+    ) -> Result<(), PredictError> {
+        let Some(photo) = scene.structure.photographs.get(photo) else { return Ok(()) };
+        match photographed::observed(scene, photo, job) {
+            Ok(found) => self.photographed.entry(member).or_default().extend(found),
+            Err(PhotoError::Cancelled(cancelled)) => return Err(cancelled.into()),
+            Err(PhotoError::Because(why)) => self.fates[self.next - 1] = Some(why),
+        }
+        Ok(())
+    }
+
+    /// Reads what instruments, eyes and photographs found on a member.
+    fn survey(&mut self, scene: &Scene, member: usize, job: &Job) -> Result<(), PredictError> {
+        let photographed = self.photographed.get(&member).map_or(&[][..], Vec::as_slice);
+        if photographed.is_empty()
+            && survey::of_member(scene, &scene.members[member].id).next().is_none()
+        {
+            return Ok(());
+        }
+        match surveyed(scene, member, photographed, &self.settings.profile, job) {
+            Ok(Surveyed { evidence, unused }) => {
+                self.unheard.extend(unused);
+                self.told.extend(evidence.map(|e| (member, e)));
+            }
+            Err(ForecastError::Cancelled) => return Err(Cancelled.into()),
+            Err(ForecastError::Because(why)) => self.fates[self.next - 1] = Some(why),
+        }
+        Ok(())
+    }
+
+    /// Asks an outside source what its items say.
+    fn ask(
+        &mut self,
+        scene: &Scene,
+        source: &dyn EvidenceSource,
+        member: usize,
+        job: &Job,
+    ) -> Result<(), PredictError> {
+        let (piece, name) = (self.next - 1, source.name());
+        let earlier = |item: &Item| matches!(item, Item::Outside(other, m, _) if *m == member && other.name() == name);
+        if [CT, GAUGES, FORECAST, SURVEY, PHOTOGRAPHED].contains(&name)
+            || self.queue[..piece].iter().any(earlier)
+        {
+            self.fates[piece] = Some(format!(
+                "another source of evidence is called \"{name}\": give this one a name of its own"
+            ));
+            return Ok(());
+        }
+        match source.evidence(scene, member, job) {
+            Ok(Said { evidence, unused }) => {
+                self.unused.extend(unused.into_iter().map(|(item, why)| ((piece, item), why)));
+                self.told.extend(evidence.map(|e| (member, Evidence { source: name, ..e })));
+            }
+            Err(EvidenceError::Cancelled(cancelled)) => return Err(cancelled.into()),
+            Err(_) if job.is_cancelled() => return Err(Cancelled.into()),
+            Err(why) if self.settings.strict => return Err(why.into()),
+            Err(why) => self.fates[piece] = Some(why.to_string()),
+        }
+        Ok(())
+    }
+
+    /// What piece `piece` came to, as a later run takes it up. None of lives, which are kept
+    /// together, of outside sources, whose data nobody here knows the state of, and of what is not
+    /// done.
+    fn done(&self, scene: &Scene, piece: usize) -> Option<Done> {
+        let fate = self.fates.get(piece)?.clone();
+        let fine = fate.is_none();
+        match self.queue.get(piece)? {
+            Item::Slice(slice) => {
+                let slice =
+                    if fine { Some(self.readings.get(slice.member)?.last()?.into()) } else { None };
+                Some(Done { fate, slice, ..Done::default() })
+            }
+            Item::Gauges(member) => {
+                let id = &scene.members.get(*member)?.id;
+                let own = |number: &usize| {
+                    scene
+                        .structure
+                        .readings
+                        .get(*number)
+                        .is_some_and(|r| gauges::member_of(scene, r) == Some(id))
+                };
+                let unused = self
+                    .unfelt
+                    .iter()
+                    .filter(|(number, _)| own(number))
+                    .map(|(number, why)| (*number, why.clone()))
+                    .collect();
+                let evidence = self.kept(*member, GAUGES)?;
+                let gauges = self.measured.get(member).cloned().unwrap_or_default();
+                Some(Done { fate, evidence, unused, gauges, ..Done::default() })
+            }
+            // It rests on photographs, which are not kept.
+            Item::Survey(member) if self.photographed.contains_key(member) => None,
+            Item::Survey(member) => {
+                let id = &scene.members.get(*member)?.id;
+                let unused = survey::of_member(scene, id)
+                    .filter_map(|(number, _)| Some((number, self.unheard.get(&number)?.clone())))
+                    .collect();
+                let evidence = self.kept(*member, SURVEY)?;
+                Some(Done { fate, evidence, unused, ..Done::default() })
+            }
+            Item::Life(_) | Item::Outside(..) | Item::Photograph(..) => None,
+        }
+    }
+
+    /// What a source said last of a member, as it is kept; `Some(None)` where it said nothing.
+    fn kept(&self, member: usize, source: &str) -> Option<Option<evidence::Kept>> {
+        let said = self.told.iter().rfind(|(index, e)| *index == member && e.source == source);
+        said.map_or(Some(None), |(_, said)| evidence::Kept::of(said).map(Some))
+    }
+
+    /// Takes the next piece from an earlier run: whether more are to come. None where it is no such
+    /// piece.
+    fn take_up(&mut self, Done { fate, slice, evidence, unused, gauges }: Done) -> Option<bool> {
+        match self.queue.get(self.next)? {
+            Item::Slice(item) => {
+                let readings = self.readings.get_mut(item.member)?;
+                readings.extend(slice.map(SliceReading::from));
+                section::keep_worst_pictures(readings);
+            }
+            Item::Gauges(member) => {
+                let said = if let Some(kept) = evidence { Some(kept.again(GAUGES)?) } else { None };
+                self.told.extend(said.map(|e| (*member, e)));
+                self.unfelt.extend(unused);
+                self.measured.insert(*member, gauges);
+            }
+            Item::Survey(member) => {
+                let said = if let Some(kept) = evidence { Some(kept.again(SURVEY)?) } else { None };
+                self.told.extend(said.map(|e| (*member, e)));
+                self.unheard.extend(unused);
+            }
+            Item::Life(_) | Item::Outside(..) | Item::Photograph(..) => return None,
+        }
+        self.next += 1;
+        self.fates.resize(self.next, fate);
+        Some(self.next < self.queue.len())
+    }
+
+    /// [Advances](Self::advance) and keeps what is done in `parts` under names that begin with
+    /// `of`; a piece that an earlier run has kept there is not done again. `of`, or the set's key,
+    /// says all that pieces depend on: the scene's hash and the settings.
+    ///
+    /// # Errors
+    /// As [`Self::advance`].
+    pub fn advance_kept(
+        &mut self,
+        scene: &Scene,
+        parts: &mut Set,
+        of: &str,
+        job: &Job,
+    ) -> Result<bool, PredictError> {
+        let (piece, name, lives) =
+            (self.next, format!("{of}, piece {}", self.next), format!("{of}, lives"));
+        if piece == 0 {
+            self.lives.extend(
+                parts.recall::<BTreeMap<String, Vec<Forecast>>>(&lives).unwrap_or_default(),
+            );
+        }
+        if let Some(more) = parts.recall(&name).and_then(|done| self.take_up(done)) {
+            return Ok(more);
+        }
+        let known = self.lives.len();
+        let more = self.advance(scene, job);
+        if self.lives.len() > known {
+            parts.keep(&lives, Vec::new(), &self.lives);
+        }
+        if let (Ok(_), Some(done)) = (&more, self.done(scene, piece)) {
+            parts.keep(&name, Vec::new(), &done);
+        }
+        more
+    }
+
+    /// What is known of a member so far: its slices once all are read, its life once it is
+    /// computed.
+    #[must_use]
+    pub fn evidence(&self, member: usize) -> Vec<Evidence> {
+        let told = self.told.iter().filter(|(index, _)| *index == member).map(|(_, e)| e.clone());
+        let seen = self
+            .is_read(member)
+            .then(|| {
+                section::seen(&self.readings[member], self.lengths[member], &self.settings.profile)
+            })
+            .flatten();
+        told.chain(seen).collect()
+    }
+
+    /// The prediction from what is done so far.
+    #[must_use]
+    pub fn finish(&self, scene: &Scene) -> Prediction {
+        let gathered: Vec<Gathered> =
+            (0..self.readings.len().min(scene.members.len())).map(|i| self.gather(i)).collect();
+        let items = self.items(scene, &gathered);
+        let members: Vec<MemberPrediction> = gathered
+            .into_iter()
+            .enumerate()
+            .map(|(index, gathered)| self.member(scene, index, gathered))
+            .collect();
+        let silence = |i: &ledger::Item| {
+            Some(MissingEvidence {
+                member: i.member.clone(),
+                source: i.source,
+                why: i.why.clone()?,
+            })
+        };
+        Prediction {
+            schema: SCHEMA,
+            version: env!("CARGO_PKG_VERSION"),
+            scene: scene.name.clone(),
+            scene_hash: scene.hash.clone(),
+            score: score(&members, &self.settings),
+            limits: limits(scene, &members, &items),
+            silences: items.iter().filter_map(silence).collect(),
+            items,
+            members,
+            profile: self.settings.profile.clone(),
+            settings: self.settings.detect,
+        }
+    }
+}
+
+/// Predicts the damage of every member: reads all slices, computes lives, asks outside `sources`,
+/// fuses.
+///
+/// # Errors
+/// A slice is missing or bad, another source failed, or the job was cancelled.
+pub fn predict(
+    scene: &Scene,
+    settings: PredictSettings,
+    sources: &Sources,
+    job: &Job,
+) -> Result<Prediction, PredictError> {
+    let mut predictor = Predictor::new(scene, settings, sources);
+    while predictor.advance(scene, job)? {}
+    job.step(1, 1)?;
+    Ok(predictor.finish(scene))
+}
