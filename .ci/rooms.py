@@ -11,8 +11,6 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 BESIDE = [{"light", "xray", "mechanics"}]
 # Rooms of one crate that need each other, and why they may; ARCHITECTURE says the same.
 CIRCLES = {
-    "app": [{"progress", "session"}],
-    "ct": [{"detect", "normal"}],
     "light": [{"battery", "bsdf", "emit"}, {"field", "link", "lit", "problem", "reach", "sensor"}],
     "mechanics": [{"element", "mesh"}],
     "panels": [

@@ -15,12 +15,13 @@
 
 #![warn(
     clippy::print_stderr,
-    reason = "it panics where stderr is full, and a result is lost: `session::say`"
+    reason = "it panics where stderr is full, and a result is lost: `console::say`"
 )]
 
 mod accumulator;
 mod args;
 mod commands;
+mod console;
 #[cfg(feature = "desktop")]
 pub mod desktop;
 mod drive;

@@ -10,7 +10,7 @@ use std::{
 use indicatif::{ProgressBar, ProgressStyle};
 use intrados_stage::Job;
 
-use crate::session::say;
+use crate::console::say;
 
 /// Shows a job until it is dropped.
 pub(crate) struct Progress(Option<(Sender<()>, JoinHandle<()>)>);

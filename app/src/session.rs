@@ -2,7 +2,7 @@
 
 use std::{
     fmt::Display,
-    io::{IsTerminal, Write},
+    io::IsTerminal,
     panic::{AssertUnwindSafe, catch_unwind},
     process::ExitCode,
 };
@@ -13,6 +13,7 @@ use tracing_subscriber::EnvFilter;
 use crate::{
     Build,
     args::{Cli, Command, Common, Format},
+    console::{one_line, say},
     failure::{Failure, Outcome},
     progress::Progress,
 };
@@ -84,22 +85,6 @@ pub(crate) fn run(
         }
     };
     ExitCode::from(code)
-}
-
-/// A line on stderr, if it can be written: a result must not be lost because nobody listens
-/// (`eprintln!` panics then).
-pub(crate) fn say(line: impl Display) {
-    let _ = writeln!(std::io::stderr(), "{line}");
-}
-
-/// A message without line breaks, whoever wrote it.
-pub(crate) fn one_line(message: &str) -> String {
-    message
-        .split(['\n', '\r'])
-        .map(str::trim)
-        .filter(|part| !part.is_empty())
-        .collect::<Vec<_>>()
-        .join(" ")
 }
 
 fn start_log(common: &Common) {

@@ -10,9 +10,10 @@ use serde::Serialize;
 
 use crate::{
     args,
+    console::one_line,
     failure::{Failure, Outcome},
     output::{self, Files},
-    session::{Session, one_line},
+    session::Session,
 };
 
 /// What was found, and where it was written. Schema `intrados.detect/1`.

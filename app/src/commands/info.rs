@@ -6,9 +6,10 @@ use serde::Serialize;
 use super::{render::MapRows, walks};
 use crate::{
     args,
+    console::{one_line, say},
     failure::{Failure, Outcome},
     output,
-    session::{Session, one_line, say},
+    session::Session,
 };
 
 /// All files. Schema `intrados.info/1`.

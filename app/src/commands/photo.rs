@@ -24,10 +24,11 @@ use serde::Serialize;
 use super::walks;
 use crate::{
     args,
+    console::one_line,
     failure::{Failure, Outcome},
     output::{self, Files},
     picture::{Facts, png_of_colours},
-    session::{Session, one_line},
+    session::Session,
 };
 use read::FaceRead;
 use relit::{Kept, MergedFace};

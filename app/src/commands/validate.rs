@@ -10,9 +10,10 @@ use serde::Serialize;
 use super::render::MapRows;
 use crate::{
     args,
+    console::one_line,
     failure::{Failure, Outcome},
     output,
-    session::{Session, one_line},
+    session::Session,
 };
 
 /// All files. Schema `intrados.validate/1`.

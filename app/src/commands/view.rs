@@ -11,8 +11,9 @@ use intrados_panels::{Exporter, PanelsPlugin};
 
 use crate::{
     args::{Cli, View},
+    console::say,
     failure::{Failure, Outcome},
-    session::{Session, say},
+    session::Session,
 };
 #[cfg(feature = "desktop")]
 use crate::{output, picture};

@@ -31,7 +31,7 @@ pub(crate) fn load(session: &Session, path: &Path) -> Result<Scene, Failure> {
     let _progress = session.watch(format!("reading {}", path.display()));
     let scene = Scene::open_within(path, &session.access, &session.job)?;
     for warning in &scene.warnings {
-        tracing::warn!("{}: {}", scene.name, crate::session::one_line(warning));
+        tracing::warn!("{}: {}", scene.name, crate::console::one_line(warning));
     }
     Ok(scene)
 }

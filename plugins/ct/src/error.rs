@@ -1,7 +1,7 @@
 use intrados_stage::Cancelled;
 use intrados_xray::{scan::ScanError, volume::VolumeError};
 
-use crate::{detect::DetectError, synthetic::drawn::DrawError};
+use crate::synthetic::drawn::DrawError;
 
 /// Why a slice is not read.
 #[derive(Debug, thiserror::Error)]
@@ -59,4 +59,30 @@ impl SliceError {
             Self::Drawn { .. } | Self::Scan(_) | Self::Cancelled(_) => false,
         }
     }
+}
+
+/// Why a slice could not be read.
+#[derive(Debug, thiserror::Error)]
+pub enum DetectError {
+    /// There is nothing but air.
+    #[error(
+        "{0}: no body found; grey must be proportional to attenuation, with 0 for the air around the specimen"
+    )]
+    NoBody(String),
+    /// The air around the specimen is brighter than the specimen.
+    #[error(
+        "{0}: what is around the specimen is brighter than it; invert the grey, so that air is dark and steel bright, or make what is outside 0"
+    )]
+    Inverted(String),
+    /// The program's own weights cannot be read.
+    #[error(
+        "the weights of the network are damaged: detect with the classical method, and install the program again"
+    )]
+    NoNetwork,
+    /// A setting makes no sense.
+    #[error("detection setting {0}")]
+    Setting(&'static str),
+    /// Somebody asked to stop.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
 }

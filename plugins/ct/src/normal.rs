@@ -5,7 +5,7 @@ use std::borrow::Cow;
 
 use intrados_stage::{Cancelled, Job};
 
-use crate::{detect::DetectSettings, slice::Slice};
+use crate::{settings::DetectSettings, slice::Slice};
 use intrados_raster::grid::{Grid, Mask};
 
 /// A slice in units of its concrete.

@@ -5,7 +5,7 @@ use intrados_stage::Job;
 use intrados_xray::{
     correct::{axis_by_mirror, bad_pixels, mend, remove_stripes_by_fit},
     recon::{Window, fbp},
-    scan::{Corrections, Detector, Drawing, Protocol, Standard, calmed},
+    scan::{Corrections, Drawing, calmed},
     specimen::{Specimen, concrete::Bar},
     volume::{self, Sinogram},
 };
@@ -14,7 +14,7 @@ use glam::DVec2;
 
 use super::{
     ExperimentError,
-    scan::{Scan, Sheet},
+    scan::{Scan, Sheet, standard},
     scatter::{Effort, Head, Scatter},
 };
 use intrados_ct::slice::Slice;
@@ -166,31 +166,6 @@ pub(crate) fn corrected_by(
     (lines.data, _) = calmed(&lines.data, &variance, [sheet.orbit.views(), 1, bins]);
     straighten(&mut lines, sheet, care.corrections, job)?;
     Ok(picture(fbp(&lines, &sheet.slice, care.window, job)?, sheet, "corrected"))
-}
-
-/// Ordinary concrete behind the tube as the sheet has it, at the mean energy behind half the
-/// member.
-fn standard(sheet: &Sheet) -> Result<Standard, ExperimentError> {
-    let (spectrum, response) = sheet.tube.radiation()?;
-    let (tube, orbit) = (sheet.tube.clone(), sheet.orbit.clone());
-    let protocol = Protocol {
-        tube,
-        spectrum,
-        fluence: 1.0,
-        focus: sheet.spot,
-        orbit,
-        detector: Detector::default(),
-        response,
-    };
-    Ok(Standard::new(&protocol, sheet.outline.reach())?)
-}
-
-/// The energy at which corrected slices show attenuation, keV.
-///
-/// # Errors
-/// The program's tables are damaged.
-pub fn energy(sheet: &Sheet) -> Result<f64, ExperimentError> {
-    Ok(standard(sheet)?.kev)
 }
 
 /// Hardening and metal: line integrals as if all photons had one energy.

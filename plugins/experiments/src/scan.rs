@@ -13,7 +13,7 @@ use intrados_xray::{
     correct::Panel,
     march::Lattice,
     physics::{Library, Matter, Model, Spectrum},
-    scan::{Detector, Energies, Protocol, Rays, ScatterMap, Tube, expose},
+    scan::{Detector, Energies, Protocol, Rays, ScatterMap, Standard, Tube, expose},
     scanner::Response,
     specimen::{
         Specimen, Substance,
@@ -25,7 +25,6 @@ use intrados_xray::{
 use super::{
     ExperimentError,
     case::{Case, Cases, Grains},
-    correct::energy,
     scatter::{Effort, Head, Scatter},
     shapes::{Bodies, Truth},
 };
@@ -384,6 +383,31 @@ fn scattering(
         cells: UVec3::new(wide as u32, deep as u32, tall),
     };
     Ok(Specimen::voxels(materials, palette, lattice, labels)?)
+}
+
+/// Ordinary concrete behind the tube as the sheet has it, at the mean energy behind half the
+/// member.
+pub(crate) fn standard(sheet: &Sheet) -> Result<Standard, ExperimentError> {
+    let (spectrum, response) = sheet.tube.radiation()?;
+    let (tube, orbit) = (sheet.tube.clone(), sheet.orbit.clone());
+    let protocol = Protocol {
+        tube,
+        spectrum,
+        fluence: 1.0,
+        focus: sheet.spot,
+        orbit,
+        detector: Detector::default(),
+        response,
+    };
+    Ok(Standard::new(&protocol, sheet.outline.reach())?)
+}
+
+/// The energy at which corrected slices show attenuation, keV.
+///
+/// # Errors
+/// The program's tables are damaged.
+pub fn energy(sheet: &Sheet) -> Result<f64, ExperimentError> {
+    Ok(standard(sheet)?.kev)
 }
 
 #[cfg(test)]

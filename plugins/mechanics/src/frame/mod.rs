@@ -11,6 +11,7 @@
 mod beam;
 mod contact;
 mod draft;
+mod export;
 mod hand;
 mod model;
 #[cfg(test)]
