@@ -119,6 +119,7 @@ fn a_photograph_becomes_evidence() {
     let evidence = &member.evidence[PHOTOGRAPHED];
     assert!(evidence.measured && member.damage.is_some());
     let cracks: Vec<_> = member.defects.iter().filter(|d| d.width_mm.is_some()).collect();
+    assert!(cracks.iter().all(|d| d.picture.is_some()), "a crack is to be seen in the report");
     let widest = cracks.iter().max_by(|a, b| a.length_m.partial_cmp(&b.length_m).unwrap()).unwrap();
     assert_eq!((widest.kind, widest.source), ("crack across", PHOTOGRAPHED), "{widest:?}");
     let [from, to] = widest.along.unwrap();

@@ -29,7 +29,7 @@ def deep(path):
 def run(program, folder, light):
     out = f"{folder}/read-{light}"
     words = [program, "photo", f"{folder}/scene.ron", f"{folder}/photo.jpg", "--pose", f"{folder}/picks.csv", "--read", *([] if light == "all" else ["--light", light]),
-             "--shadow-error-mm", "60", "--mm-per-px", "0.5", "--member", "M", "--out", out, "--format", "json", "--quiet"]
+             "--mm-per-px", "0.5", "--member", "M", "--out", out, "--format", "json", "--quiet"]
     done = subprocess.run(words, capture_output=True, text=True)
     return (json.loads(done.stdout) if done.returncode == 0 else {"error": done.stderr.strip()}), out
 

@@ -9,7 +9,10 @@ use intrados_scene::{
     structure::{Course, Observation, Shows},
 };
 use intrados_stage::Estimate;
-use intrados_survey::{self as survey, SURVEY, photographed::PHOTOGRAPHED};
+use intrados_survey::{
+    self as survey, SURVEY,
+    photographed::{PHOTOGRAPHED, Shown},
+};
 use serde::Serialize;
 
 use crate::{CT, SliceReading, section::widest};
@@ -59,11 +62,14 @@ impl Defect {
 pub(crate) fn defects(
     scene: &Scene,
     member: &str,
-    photographed: &[Observation],
+    photographed: &Shown,
     slices: &[SliceReading],
 ) -> Vec<Defect> {
     let seen = survey::of_member(scene, member).filter_map(|(_, o)| seen(SURVEY, o));
-    let shown = photographed.iter().filter_map(|o| self::seen(PHOTOGRAPHED, o));
+    let shown = photographed.observations.iter().zip(&photographed.pictures);
+    let shown = shown.filter_map(|(o, picture)| {
+        Some(Defect { picture: picture.clone(), ..self::seen(PHOTOGRAPHED, o)? })
+    });
     seen.chain(shown).chain(grouped(slices).iter().flat_map(|group| sectioned(group))).collect()
 }
 

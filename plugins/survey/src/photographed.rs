@@ -8,13 +8,15 @@
 //!
 //! [`survey`]:
 
+use intrados_ct::{Picture, picture::CRACK};
 use intrados_damage::zone::{ZONES, zone_at};
 use intrados_photo::{
     Located, Photograph, Prior, Site,
     face::{Chart, Surface},
     locate,
-    map::MapError,
+    map::{FaceMap, MapError},
     picks,
+    picture::srgb,
     reading::{Defect, FaceReading, ReadFace, read_all},
     relight::{RelightError, RelightSettings, relight},
     taken::Focal,
@@ -87,12 +89,28 @@ pub fn placed(
     Ok((photograph, site, located))
 }
 
+/// What photographs show of a member.
+#[derive(Debug, Clone, Default)]
+pub struct Shown {
+    /// What was found, and where nothing was.
+    pub observations: Vec<Observation>,
+    /// What each looks like.
+    pub pictures: Vec<Option<Picture>>,
+}
+
+impl Shown {
+    /// Takes what another photograph shows.
+    pub fn extend(&mut self, more: Self) {
+        self.observations.extend(more.observations);
+        self.pictures.extend(more.pictures);
+    }
+}
+
 /// What a photograph shows of its member.
-pub fn observed(
-    scene: &Scene,
-    photo: &Photographed,
-    job: &Job,
-) -> Result<Vec<Observation>, PhotoError> {
+///
+/// # Errors
+/// It cannot be read, placed or relit, it shows nothing of the member, or the job was cancelled.
+pub fn observed(scene: &Scene, photo: &Photographed, job: &Job) -> Result<Shown, PhotoError> {
     let member = scene.members.iter().position(|m| m.id == photo.member);
     let member = member.ok_or_else(|| because("its member is lost"))?;
     let (photograph, site, located) = placed(scene, photo, job)?;
@@ -129,7 +147,7 @@ pub fn observed(
 }
 
 /// What was found and what was not, face by face and zone by zone.
-fn observations(photo: &Photographed, surface: &Surface, faces: &[&ReadFace]) -> Vec<Observation> {
+fn observations(photo: &Photographed, surface: &Surface, faces: &[&ReadFace]) -> Shown {
     let length = surface.length();
     let observation = |name: String, spot: Spot, shows: Shows| Observation {
         member: photo.member.clone(),
@@ -140,7 +158,7 @@ fn observations(photo: &Photographed, surface: &Surface, faces: &[&ReadFace]) ->
         picture: None,
         shows,
     };
-    let mut found = Vec::new();
+    let (mut found, mut pictures) = (Vec::new(), Vec::new());
     let mut is_marred = [false; ZONES];
     for face in faces {
         for defect in &face.reading.defects {
@@ -155,6 +173,7 @@ fn observations(photo: &Photographed, surface: &Surface, faces: &[&ReadFace]) ->
                 height_m: None,
             };
             let number = found.len() + 1;
+            pictures.push(crop(&face.map.face, defect, &photo.name));
             found.push(observation(
                 format!("{}, {} {number}", photo.name, defect.kind()),
                 spot,
@@ -178,7 +197,69 @@ fn observations(photo: &Photographed, surface: &Surface, faces: &[&ReadFace]) ->
         let shows = Shows::Intact { seen: VOUCHED * seen.min(1.0), limit_mm };
         found.push(observation(format!("{}, zone {}", photo.name, zone + 1), spot, shows));
     }
-    found
+    pictures.resize(found.len(), None);
+    Shown { observations: found, pictures }
+}
+
+/// Longest side of a defect's picture, pixels of the face's map.
+const LONGEST: usize = 400;
+
+/// A defect on the unrolled face without the light, and the same with the course of a crack.
+fn crop(map: &FaceMap, defect: &Defect, name: &str) -> Option<Picture> {
+    let metres = 1e-3 * map.mm_px;
+    let place = |across: f64, along: f64| {
+        [(across - map.corner[0]) / metres, (map.corner[1] - along) / metres].map(|p| p as isize)
+    };
+    let points: Vec<[isize; 2]> = match defect {
+        Defect::Crack(crack) => crack.points.iter().map(|p| place(p.across_m, p.along_m)).collect(),
+        Defect::Spall { patch, .. } | Defect::Rust(patch) | Defect::Efflorescence(patch) => {
+            let half = 0.5 * patch.area_m2.max(0.0).sqrt();
+            patch
+                .reach_m
+                .map(|along| place(patch.across_m, along))
+                .into_iter()
+                .chain([-half, half].map(|by| place(patch.across_m + by, patch.along_m)))
+                .collect()
+        }
+    };
+    // Of a long crack its middle.
+    let [low, high] = [0, 1].map(|side| {
+        [0, 1].map(|k| {
+            let reach = points.iter().map(|p| p[k]);
+            let ends = [reach.clone().min().unwrap_or(0) - 20, reach.max().unwrap_or(0) + 20];
+            let (middle, half) =
+                ((ends[0] + ends[1]) / 2, ((ends[1] - ends[0]) / 2).min(LONGEST as isize / 2));
+            (middle + if side == 0 { -half } else { half }).clamp(0, map.size[k] as isize) as usize
+        })
+    });
+    let size = [high[0].checked_sub(low[0])?, high[1].checked_sub(low[1])?];
+    if size[0] == 0 || size[1] == 0 {
+        return None;
+    }
+    let at = |x: usize, y: usize| map.light[(low[1] + y) * map.size[0] + low[0] + x];
+    let all = (0..size[1]).flat_map(|y| (0..size[0]).map(move |x| (x, y)));
+    let mut bright: Vec<f32> =
+        all.clone().filter_map(|(x, y)| Some(at(x, y)?.max_element())).collect();
+    bright.sort_by(f32::total_cmp);
+    let white = bright.get(bright.len() * 95 / 100)?.max(1e-6);
+    let grey = |x, y| at(x, y).map_or([255; 3], |c| (c / white * 0.75).to_array().map(srgb));
+    let plain: Vec<[u8; 3]> = all.map(|(x, y)| grey(x, y)).collect();
+    let mut drawn = plain.clone();
+    for [x, y] in points.iter().filter(|_| matches!(defect, Defect::Crack(_))) {
+        let inside = |v: isize, k: usize| {
+            usize::try_from(v).ok()?.checked_sub(low[k]).filter(|&v| v < size[k])
+        };
+        if let (Some(x), Some(y)) = (inside(*x, 0), inside(*y, 1)) {
+            drawn[y * size[0] + x] = CRACK;
+        }
+    }
+    let rows = plain.chunks(size[0]).zip(drawn.chunks(size[0]));
+    Some(Picture {
+        width: 2 * size[0],
+        height: size[1],
+        rgb: rows.flat_map(|(a, b)| a.iter().chain(b)).flatten().copied().collect(),
+        caption: format!("{name}, its light taken off, {:.2} mm a pixel", map.mm_px),
+    })
 }
 
 fn shows(defect: &Defect) -> Shows {
@@ -204,5 +285,40 @@ fn angle_deg(face: &ReadFace, defect: &Defect) -> f64 {
         Chart::Around(radius) | Chart::Inside(radius) => {
             (defect.across_m() / radius).to_degrees().rem_euclid(360.0)
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+    use intrados_photo::reading::{Crack, CrackPoint};
+    use intrados_scene::structure::Course;
+
+    use super::*;
+
+    /// Ten centimetres of a crack along in a face of 100 × 400 pixels, of which a corner is unknown.
+    #[test]
+    fn a_crack_has_its_picture() {
+        let mut light = vec![Some(Vec3::splat(0.4)); 100 * 400];
+        light[150 * 100 + 35] = None;
+        let map = FaceMap { size: [100, 400], mm_px: 1.0, corner: [-0.05, 0.4], light };
+        let point = |along_m| CrackPoint { across_m: 0.0, along_m, width_mm: None, error_mm: None };
+        let crack = Crack {
+            points: (0..=10).map(|k| point(0.15 + 0.01 * f64::from(k))).collect(),
+            length_m: 0.1,
+            width_mm: 0.3,
+            width_error_mm: 0.1,
+            widest_mm: 0.3,
+            widest_error_mm: 0.1,
+            course: Course::Along,
+            to_axis_deg: 0.0,
+            returned: [0.1, 0.1],
+        };
+        let picture = crop(&map, &Defect::Crack(crack), "front").unwrap();
+        assert_eq!((picture.width, picture.height), (80, 140));
+        let pixels = picture.rgb.as_chunks::<3>().0;
+        let red = pixels.iter().enumerate().filter(|(_, p)| **p == CRACK).map(|(i, _)| i % 80);
+        assert_eq!(red.collect::<Vec<_>>(), [60; 11], "in the middle of the right half");
+        assert_eq!(pixels.iter().filter(|p| **p == [255; 3]).count(), 2, "unknown, on either side");
     }
 }

@@ -25,12 +25,12 @@ use intrados_forecast::{FORECAST, Forecast, ForecastError, forecast};
 use intrados_gauges as gauges;
 use intrados_gauges::{GAUGES, GaugeError, GaugeReading, monitoring};
 use intrados_mechanics::frame;
-use intrados_scene::{Assembly, Scene, structure::Observation};
+use intrados_scene::{Assembly, Scene};
 use intrados_stage::{Cancelled, Job, file::Set};
 use intrados_survey as survey;
 use intrados_survey::{
     SURVEY, Surveyed,
-    photographed::{self, PHOTOGRAPHED, PhotoError},
+    photographed::{self, PHOTOGRAPHED, PhotoError, Shown},
     surveyed,
 };
 use rayon::prelude::*;
@@ -71,7 +71,7 @@ pub struct Predictor {
     /// What gauges read, by member.
     measured: BTreeMap<usize, Vec<GaugeReading>>,
     /// What photographs show, by member.
-    photographed: BTreeMap<usize, Vec<Observation>>,
+    photographed: BTreeMap<usize, Shown>,
     /// Observations that count for nothing, by their number, and why.
     unheard: BTreeMap<usize, String>,
     /// Items of outside sources that count for nothing, by piece and number, and why.
@@ -412,7 +412,8 @@ impl Predictor {
 
     /// Reads what instruments, eyes and photographs found on a member.
     fn survey(&mut self, scene: &Scene, member: usize, job: &Job) -> Result<(), PredictError> {
-        let photographed = self.photographed.get(&member).map_or(&[][..], Vec::as_slice);
+        let shown = self.photographed.get(&member);
+        let photographed = shown.map_or(&[][..], |shown| &shown.observations);
         if photographed.is_empty()
             && survey::of_member(scene, &scene.members[member].id).next().is_none()
         {

@@ -25,7 +25,7 @@ use intrados_stage::Estimate;
 use intrados_survey as survey;
 use intrados_survey::{
     SURVEY,
-    photographed::{self, PHOTOGRAPHED},
+    photographed::{self, PHOTOGRAPHED, Shown},
 };
 
 use crate::{
@@ -192,9 +192,11 @@ impl Predictor {
             .filter_map(|e| Some((e.source, e.crack_width_mm?)))
             .max_by(|a, b| a.1.total_cmp(&b.1));
         let found = survey::of_member(scene, &member.id).map(|(_, o)| o);
-        let photographed = self.photographed.get(&index).map_or(&[][..], Vec::as_slice);
+        let nothing = Shown::default();
+        let photographed = self.photographed.get(&index).unwrap_or(&nothing);
         let mut conflicts = whole.conflicts.clone();
-        conflicts.extend(unforeseen(found.chain(photographed), evidence.get(FORECAST)));
+        conflicts
+            .extend(unforeseen(found.chain(&photographed.observations), evidence.get(FORECAST)));
         MemberPrediction {
             id: member.id.clone(),
             name: member.name.clone(),
