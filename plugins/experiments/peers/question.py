@@ -6,16 +6,21 @@
     d  relit with global illumination                --light all
 
     python3 question.py OUT [--intrados target/release/intrados]
+    python3 question.py OUT --marks target/release/examples/marks --weights direct=DIRECT.f32 global=GLOBAL.f32
+
+The second reads the relit maps of d with networks that were trained alike on other lessons (direct light; with bounces), pixels of the
+mask against the planted cracks at 1 mm.
 
 OUT holds members of members.py. What was read is kept (OUT/K/read-WAY.json) and not read again. One JSON line a member and way: F1 of
 points of cracks at 1 mm, width error, and the error of the member's damage, by the program's own rule for findings (a crack across or
 askew costs half of width/1 mm times length/side; the worst counts) applied to what was read and to what was planted. Then, of d against
 each other way, mean differences with 95 % intervals (bootstrap over members) and Wilcoxon's signed ranks. Chosen on the development
 members: nothing but b's reach of 16 pixels, which is also the network's own."""
-import argparse, glob, json, math, os, subprocess
+import argparse, glob, json, math, os, shutil, subprocess
 import numpy as np
 from PIL import Image
 from scipy import ndimage, stats
+from scipy.spatial import cKDTree
 import score_members as score
 
 WAYS = {"a": "none", "b": "none", "c": "direct", "d": "all"}
@@ -80,9 +85,46 @@ def member(program, folder, way):
     else:
         f1 = 2 * recall * precision / max(1e-9, recall + precision)
     wide = [f - t for t, f, _ in c["rows"] if 0.1 <= t <= 1]
+    held = [abs(f - t) < 1.96 * s for t, f, s in c["rows"] if 0.1 <= t <= 1 and s]
     return {"member": int(folder.rsplit("/", 1)[1]), "way": way, "light": truth["light"], "f1": round(f1, 4), "recall": round(recall, 3), "precision": round(precision, 3),
             "damage_error": round(abs(damage(found(photo)) - damage(planted(truth))), 4), "width_bias_mm": round(float(np.mean(wide)), 3) if wide else None,
-            "width_rms_mm": round(float(np.sqrt(np.mean(np.square(wide)))), 3) if wide else None, **({"error": said["error"]} if "error" in said else {})}
+            "width_rms_mm": round(float(np.sqrt(np.mean(np.square(wide)))), 3) if wide else None, "width_points": len(wide),
+            "width_within": round(float(np.mean(held)), 3) if held else None, **({"error": said["error"]} if "error" in said else {})}
+
+
+def trained(marks, out, folders, name, weights):
+    """F1 of pixels by member, of the network `weights` on the maps of d."""
+    maps, masks = f"{out}/maps", f"{out}/masks-{name}"
+    os.makedirs(maps, exist_ok=True)
+    for folder in folders:
+        source = f"{folder}/way-d/photo.jpg_M_Front_relit.png"
+        if os.path.exists(source):
+            shutil.copy(source, f"{maps}/{folder.rsplit('/', 1)[1]}.png")
+    subprocess.run([marks, maps, masks, weights], check=True, stdout=subprocess.DEVNULL)
+    rows = []
+    for folder in folders:
+        k, truth, said = folder.rsplit("/", 1)[1], json.load(open(f"{folder}/truth.json")), json.load(open(f"{folder}/read-d.json"))
+        face = next((f for f in said["photos"][0]["faces"] if f["face"] == "Front"), None) if said["photos"] else None
+        if face is None or not os.path.exists(f"{masks}/{k}.png"):
+            continue
+        mask = np.asarray(Image.open(f"{masks}/{k}.png")) > 127
+        left, top = face["map_corner_m"]
+        y, x = np.nonzero(mask)
+        found = np.stack([left + (x + 0.5) * 5e-4, top - (y + 0.5) * 5e-4], 1)
+        true = [score.points(c) for c in truth["cracks"]]
+        near = lambda p: any(math.hypot(p[0] - a, p[1] - b) < 1.5 * r for a, b, r, _ in truth["spalls"])
+        if not true:
+            rows.append(float(not [p for p in found if not near(p)]))
+            continue
+        points, width = np.concatenate([p for p, _ in true]), np.concatenate([w for _, w in true])
+        if not len(found):
+            rows.append(0.0)
+            continue
+        distance, at = cKDTree(points).query(found)
+        real = (distance < 1e-3 + 0.5e-3 * width[at]) | np.array([near(p) for p in found])
+        recall = (cKDTree(found).query(points)[0] < 1e-3 + 0.5e-3 * width).mean()
+        rows.append(2 * recall * real.mean() / max(1e-9, recall + real.mean()))
+    return rows
 
 
 def paired(x, y, rng):
@@ -95,8 +137,17 @@ def paired(x, y, rng):
 if __name__ == "__main__":
     a = argparse.ArgumentParser()
     a.add_argument("out"); a.add_argument("--intrados", default="target/release/intrados")
+    a.add_argument("--marks"); a.add_argument("--weights", nargs="*", default=[])
     a = a.parse_args()
     folders = sorted(glob.glob(f"{a.out}/[0-9]*"), key=lambda p: int(p.rsplit("/", 1)[1]))
+    if a.marks:
+        named = dict(w.split("=", 1) for w in a.weights)
+        f1 = {name: trained(a.marks, a.out, folders, name, weights) for name, weights in named.items()}
+        for name in f1:
+            print(json.dumps({"trained": name, "f1": round(float(np.mean(f1[name])), 3), "by_member": [round(float(v), 3) for v in f1[name]]}))
+        if {"direct", "global"} <= set(f1):
+            print(json.dumps({"global_against": "direct", "f1": paired(f1["global"], f1["direct"], np.random.default_rng(1))}))
+        raise SystemExit
     rows = {way: [] for way in WAYS}
     for folder in folders:
         for way in WAYS:

@@ -6,6 +6,7 @@
 use glam::Vec3;
 use intrados_light::{
     Patch,
+    patch::ORDERS,
     tone::{Curve, Tone},
 };
 use intrados_stage::{Job, cpu_seconds, random::Key};
@@ -25,7 +26,7 @@ fn main() {
     for n in 0..COLUMNS * ROWS {
         let key = Key::new(first + n as u64, 0);
         let before = cpu_seconds();
-        let patch = Patch::render(key, size as u32, samples, &Job::default()).unwrap();
+        let patch = Patch::render(key, size as u32, samples, ORDERS, &Job::default()).unwrap();
         let widths: Vec<f32> = patch
             .courses
             .iter()

@@ -19,8 +19,10 @@ use crate::{LitScene, Render, RenderSettings, Sides, View, luminance};
 
 /// Label rays along a pixel's side.
 const FINE: u32 = 3;
-/// Longest path: lamp, two bounces, camera.
-const ORDERS: u32 = 4;
+/// Longest path of light: lamp, two bounces, camera.
+pub const ORDERS: u32 = 4;
+/// Longest path of direct light: lamp, surface, camera.
+pub const DIRECT: u32 = 2;
 
 /// A square picture of a made-up face and what is to be seen in it.
 #[derive(Debug, Clone)]
@@ -64,18 +66,24 @@ pub struct CoursePoint {
 }
 
 impl Patch {
-    /// The patch of `key`, `size` pixels along a side, from `samples` walks a pixel. The same bits
-    /// for any number of threads.
+    /// The patch of `key`, `size` pixels along a side, from `samples` walks a pixel, in light of at
+    /// most so many `orders` ([`ORDERS`], [`DIRECT`]). The same bits for any number of threads.
     ///
     /// # Errors
     /// [`Cancelled`] soon after the job was.
-    pub fn render(key: Key, size: u32, samples: u64, job: &Job) -> Result<Self, Cancelled> {
+    pub fn render(
+        key: Key,
+        size: u32,
+        samples: u64,
+        orders: u32,
+        job: &Job,
+    ) -> Result<Self, Cancelled> {
         let scenery::Drawn { scene, camera, pixel, courses } = scenery::draw(key, size);
         let lit = Arc::new(LitScene::build(Arc::new(scene), job)?);
         let settings = RenderSettings {
             sides: Sides::Primal,
             rule: WalkRule {
-                max_order: ORDERS,
+                max_order: orders,
                 alike: u64::from(size) * u64::from(size),
                 ..WalkRule::default()
             },
@@ -195,7 +203,7 @@ mod tests {
     use super::*;
 
     fn patch(seed: u64) -> Patch {
-        Patch::render(Key::new(seed, 0), 64, 2, &Job::default()).unwrap()
+        Patch::render(Key::new(seed, 0), 64, 2, ORDERS, &Job::default()).unwrap()
     }
 
     #[test]

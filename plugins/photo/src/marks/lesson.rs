@@ -42,12 +42,13 @@ pub struct Mouth {
 }
 
 impl Lesson {
-    /// The lesson `number` of `seed`.
+    /// The lesson `number` of `seed`, in light of at most so many `orders`
+    /// ([`ORDERS`](intrados_light::patch::ORDERS); fewer to find out what they are good for).
     ///
     /// # Errors
     /// The job was cancelled.
-    pub fn render(seed: u64, number: u64, job: &Job) -> Result<Self, Cancelled> {
-        let patch = Patch::render(Key::new(seed, number), SIDE as u32, SAMPLES, job)?;
+    pub fn render(seed: u64, number: u64, orders: u32, job: &Job) -> Result<Self, Cancelled> {
+        let patch = Patch::render(Key::new(seed, number), SIDE as u32, SAMPLES, orders, job)?;
         let mouth =
             |p: &CoursePoint| Mouth { at: p.at, width: p.width / patch.pixel, visible: p.visible };
         let label =
@@ -125,11 +126,13 @@ fn mouth([x, y, width]: [f32; 3]) -> Mouth {
 
 #[cfg(test)]
 mod tests {
+    use intrados_light::patch::ORDERS;
+
     use super::*;
 
     #[test]
     fn a_lesson_is_read_as_it_was_kept() {
-        let lesson = Lesson::render(3, 1, &Job::default()).unwrap();
+        let lesson = Lesson::render(3, 1, ORDERS, &Job::default()).unwrap();
         let again = Lesson::from_bytes(&lesson.to_bytes()).unwrap();
         assert_eq!(again.courses, lesson.courses);
         for (a, b) in again.light.iter().zip(&lesson.light) {

@@ -1,10 +1,12 @@
+use intrados_light::patch::ORDERS;
+
 use super::{lesson::Lesson, *};
 
 /// A seed that no lesson was drawn from.
 const FRESH: u64 = 4_711;
 
 fn fresh(number: u64) -> Lesson {
-    Lesson::render(FRESH, number, &Job::default()).unwrap()
+    Lesson::render(FRESH, number, ORDERS, &Job::default()).unwrap()
 }
 
 fn light(lesson: &Lesson) -> Grid<Vec3> {

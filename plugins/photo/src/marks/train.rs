@@ -128,6 +128,8 @@ impl Reader {
 
 #[cfg(test)]
 mod tests {
+    use intrados_light::patch::ORDERS;
+
     use super::*;
 
     fn recipe() -> Recipe {
@@ -148,7 +150,7 @@ mod tests {
     /// The gradient of the loss by what the network gives, against central differences.
     #[test]
     fn gradient_equals_differences() {
-        let lesson = Lesson::render(9, 4, &Job::default()).unwrap();
+        let lesson = Lesson::render(9, 4, ORDERS, &Job::default()).unwrap();
         let sample = Sample::drawn(&lesson, 32, Key::new(1, 1)).unwrap();
         let mut out = Planes::new(MARKS * PIXELS, 16, 16);
         let places: Vec<_> =
@@ -178,7 +180,7 @@ mod tests {
     #[test]
     fn training_repeats_to_the_bit_on_any_number_of_threads() {
         let lessons: Vec<Lesson> =
-            (0..2).map(|n| Lesson::render(9, n, &Job::default()).unwrap()).collect();
+            (0..2).map(|n| Lesson::render(9, n, ORDERS, &Job::default()).unwrap()).collect();
         let trained = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             let mut losses = Vec::new();
