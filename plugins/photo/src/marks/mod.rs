@@ -9,6 +9,7 @@ mod camera;
 pub mod lesson;
 mod outline;
 mod sample;
+mod scales;
 mod sight;
 pub mod train;
 
@@ -21,6 +22,7 @@ use intrados_raster::{
 };
 use intrados_stage::{Cancelled, Job};
 
+use scales::{SMALLEST, halved};
 use sight::{CELL, PIXELS, PLANES, Sight};
 
 /// A kind of damage that is seen.
@@ -83,13 +85,13 @@ impl Marks {
         outline::lines(self.of(Mark::Crack), outline::CRACKS)
     }
 
-    /// Where there is damage of a kind. With the carried weights missing cover, steel and
-    /// efflorescence are never probable enough, and rust seldom: only cracks are read so far.
+    /// Where there is damage of a kind. With the carried weights about half of the steel and of the
+    /// rust is found, and next to nothing of missing cover and efflorescence.
     #[must_use]
     pub fn areas(&self, mark: Mark) -> Mask {
         match mark {
             Mark::Crack => self.cracks(),
-            _ => outline::areas(self.of(mark)),
+            _ => outline::areas(self.of(mark), outline::sure(mark)),
         }
     }
 }
@@ -141,7 +143,23 @@ impl Reader {
         self.marks_by(TILE, light, known, job)
     }
 
+    /// At the picture's own scale and at half of it.
     fn marks_by(
+        &self,
+        tile: usize,
+        light: &Grid<Vec3>,
+        known: &Mask,
+        job: &Job,
+    ) -> Result<Marks, Cancelled> {
+        let mut marks = self.at_one_scale(tile, light, known, job)?;
+        let (half, seen) = halved(light, known);
+        if half.width.min(half.height) >= SMALLEST {
+            marks.weigh(&self.at_one_scale(tile, &half, &seen, job)?, known);
+        }
+        Ok(marks)
+    }
+
+    fn at_one_scale(
         &self,
         tile: usize,
         light: &Grid<Vec3>,

@@ -96,3 +96,32 @@ fn cracks_are_found_in_pictures_that_training_did_not_see() {
     println!("cracks {:.3}", f1(cracks));
     assert!(f1(cracks) > 0.6, "{cracks:?}");
 }
+
+/// What the other kinds reach, pixel by pixel: precision and recall by threshold.
+#[test]
+#[ignore = "prints a table; by hand"]
+fn the_other_kinds() {
+    const CHANCES: [f32; 7] = [0.25, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95];
+    let mut counts = [[[0_usize; 3]; CHANCES.len()]; MARKS];
+    for number in 0..120 {
+        let lesson = fresh(number);
+        let marks = read(&lesson);
+        for mark in Mark::ALL {
+            for (sure, counts) in CHANCES.iter().zip(&mut counts[mark as usize]) {
+                for (p, l) in marks.of(mark).data.iter().zip(&lesson.labels) {
+                    let (found, is) = (p > sure, l[mark as usize] > 0.5);
+                    counts[0] += usize::from(found && is);
+                    counts[1] += usize::from(found);
+                    counts[2] += usize::from(is);
+                }
+            }
+        }
+    }
+    for mark in Mark::ALL {
+        println!("{mark:?}, {} pixels", counts[mark as usize][0][2]);
+        for (sure, [both, found, is]) in CHANCES.iter().zip(counts[mark as usize]) {
+            let share = |of: usize| both as f64 / of.max(1) as f64;
+            println!("  above {sure}: precision {:.2}, recall {:.2}", share(found), share(is));
+        }
+    }
+}
