@@ -15,7 +15,7 @@ CIRCLES = {
     "mechanics": [{"element", "mesh"}],
     "panels": [
         {"picture", "refine", "statistics", "viewpoint"},
-        {"action", "banner", "ct", "dialog", "export", "layout", "members", "render", "report", "start", "stress"},
+        {"action", "banner", "ct", "dialog", "export", "layout", "members", "photos", "render", "report", "start", "stress"},
     ],
     "scene": [{"file", "load", "parametric"}, {"member", "scene", "structure"}],
 }

@@ -183,6 +183,7 @@ impl Hand {
                 let tab = dice.one(&[
                     "Render",
                     "CT",
+                    "Photos",
                     "Stress",
                     "Report",
                     "Convergence",

@@ -23,9 +23,12 @@ use intrados_panels::{
     Action, Actions, AddPanel, Latest, Log, Look, PanelsPlugin, Place, Quantity, Refine, Selection,
     Statistics, Viewpoint, show,
 };
+use intrados_photo::{Pose, Site};
 use intrados_predict::Progress;
 use intrados_predict::predict;
-use intrados_scene::{CrackSurface, Member, Mouth, SurfaceDamage, plugin::CurrentScene};
+use intrados_scene::{
+    Camera, CrackSurface, Member, Mouth, Scene, SurfaceDamage, plugin::CurrentScene,
+};
 use intrados_stage::{Job, Jobs, Pace, Work};
 use intrados_transport::{BATCH, Schedule, Side, Steering};
 use intrados_xray::{
@@ -892,4 +895,90 @@ fn export(window: &mut Window, file: &Path) {
     window.frames(2);
     window.click("Save");
     window.until("the file", |_| file.exists());
+}
+
+/// A pillar before a wall, and a photograph of it: flat colours, that is all that placing needs.
+fn photographed(folder: &Path) -> (std::path::PathBuf, std::path::PathBuf, Camera) {
+    let scene = r#"(
+    schema: "intrados.scene/1",
+    materials: [(name: "concrete", colour: (0.42, 0.41, 0.4))],
+    members: [(
+        id: "P", name: "Pillar",
+        body: Column(section: Rectangle(width_m: 0.3, depth_m: 0.3), height_m: 0.6),
+        at: (0, 0, 0), concrete: "C30/37", material: "concrete",
+    )],
+    lamps: [Environment(name: "sky", radiance: (1, 1, 1))],
+    cameras: [(name: "shot", position: (0.3, 0.5, 1.15), target: (0.03, 0.3, 0.1), fov_deg: 42, width: 400, height: 400, exposure: 0)],
+)"#;
+    let path = folder.join("scene.ron");
+    std::fs::write(&path, scene).expect("a file");
+    let camera = Scene::open(&path, &Job::default()).expect("a scene").cameras[0].clone();
+    let picture = folder.join("pillar.png");
+    image::RgbImage::from_pixel(400, 400, image::Rgb([120, 118, 115]))
+        .save(&picture)
+        .expect("a file");
+    (path, picture, camera)
+}
+
+fn press(window: &mut Window, at: egui::Pos2) {
+    window.harness.hover_at(at);
+    window.frame();
+    for pressed in [true, false] {
+        window.harness.event(egui::Event::PointerButton {
+            pos: at,
+            button: egui::PointerButton::Primary,
+            pressed,
+            modifiers: egui::Modifiers::NONE,
+        });
+        window.frame();
+    }
+    window.frames(2);
+}
+
+/// Six corners clicked in the drawing's list and in the photograph tell where the camera stood; the
+/// photograph becomes evidence, and its picks are there when it is looked at again.
+#[test]
+fn a_photograph_is_placed_by_its_corners_and_becomes_evidence() {
+    let folder = tempfile::tempdir().unwrap();
+    let (path, picture, camera) = photographed(folder.path());
+    let mut window = Window::new(|_| {});
+    window.ask(Action::Open(path.clone()));
+    window.until("a scene", |w| w.contains_resource::<CurrentScene>());
+    window.ask(Action::Select(Some(0)));
+    window.ask(Action::Photograph(picture));
+    window.until_seen("Photograph");
+    let scene = Scene::open(&path, &Job::default()).unwrap();
+    let site = Site::new(&scene, &Job::default()).unwrap();
+    let corners = site.surface(0).unwrap().outline().corners;
+    assert_eq!(corners.len(), 8);
+    let pose = Pose::of(&camera);
+    let rect = window.harness.get_by_label("Photograph").rect();
+    let scale = f64::from(rect.width().min(rect.height())) / 400.0;
+    // The two at the back on the left are behind the pillar.
+    let seen = |p: &glam::DVec3| p.z > 0.0 || p.x > 0.0;
+    for (k, corner) in corners.iter().enumerate().filter(|(_, p)| seen(p)) {
+        window.click(&format!("Corner {}", k + 1));
+        let [u, v] = pose.project(*corner).unwrap();
+        let to = egui::vec2((scale * (u - 200.0)) as f32, (scale * (v - 200.0)) as f32);
+        press(&mut window, rect.center() + to);
+    }
+    for _ in 0..2000 {
+        if window.harness.query_by_label_contains("Taken from").is_some() {
+            break;
+        }
+        window.frame();
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    let told = window.harness.get_by_label_contains("Taken from");
+    let told = told.accesskit_node().label().or(told.accesskit_node().value()).unwrap();
+    let numbers: Vec<f32> =
+        told.split(['(', ',', ')']).filter_map(|word| word.trim().parse().ok()).collect();
+    let from = Vec3::new(numbers[0], numbers[1], numbers[2]);
+    assert!(from.distance(camera.position) < 0.05, "{told}");
+
+    window.click("Add to the evidence");
+    window.until("evidence", |w| w.resource::<CurrentScene>().0.structure.photographs.len() == 1);
+    let photo = window.with(|w| w.resource::<CurrentScene>().0.structure.photographs[0].clone());
+    assert!(photo.file.starts_with(folder.path()) && photo.member == "P");
+    assert_eq!(std::fs::read_to_string(&photo.picks).unwrap().lines().count(), 7);
 }

@@ -13,6 +13,7 @@ use crate::{
     dialog::{Dialogs, Purpose},
     export::Export,
     layout::Layout,
+    photos::Photos,
     place::Panels,
     recent::Recent,
 };
@@ -53,6 +54,10 @@ pub enum Action {
     Tab(&'static str),
     /// Show a slice of the selected member, by its place among those of the scene, in the CT tab.
     Slice(usize),
+    /// Look at a photograph in the Photos tab.
+    Photograph(PathBuf),
+    /// Choose a photograph in a dialog.
+    ChoosePhotograph,
     /// Ask for a file name to export to.
     Export,
     /// Choose that file name in a dialog.
@@ -146,6 +151,11 @@ fn carry_out(world: &mut World, action: Action) {
             world.resource_mut::<Ct>().show(index);
             show_tab(world, "CT");
         }
+        Action::Photograph(path) => {
+            world.resource_mut::<Photos>().show(path);
+            show_tab(world, "Photos");
+        }
+        Action::ChoosePhotograph => Dialogs::open(world, Purpose::Photograph),
         Action::Export => {
             let name =
                 world.get_resource::<CurrentScene>().map(|s| s.0.name.clone()).unwrap_or_default();

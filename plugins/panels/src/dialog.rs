@@ -1,7 +1,7 @@
 //! The system's file dialogs, each on a thread of its own.
 
 use std::{
-    path::PathBuf,
+    path::{Path, PathBuf},
     time::{Duration, Instant},
 };
 
@@ -13,10 +13,20 @@ use crate::{Action, Actions, Banners, Log, export::Export};
 /// A dialog that is gone sooner than anybody can click was never there.
 const TOO_SOON: Duration = Duration::from_millis(400);
 
+/// What photographs end in.
+const PHOTOGRAPHS: &[&str] = &["jpg", "jpeg", "png", "tif", "tiff"];
+
+/// Whether a file is a photograph, by its name; those too that are refused with a remedy.
+pub(crate) fn is_photograph(path: &Path) -> bool {
+    let ending = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    PHOTOGRAPHS.contains(&ending.as_str()) || ["heic", "heif"].contains(&ending.as_str())
+}
+
 /// What a dialog is for.
 #[derive(Debug, Clone)]
 pub(crate) enum Purpose {
     Open,
+    Photograph,
     /// With a proposal.
     Save(String),
 }
@@ -52,6 +62,11 @@ impl Dialogs {
                     Purpose::Open => rfd::FileDialog::new()
                         .set_title("Open a scene")
                         .add_filter("Scenes and models", &["ron", "glb", "gltf", "ifc"])
+                        .add_filter("All files", &["*"])
+                        .pick_file(),
+                    Purpose::Photograph => rfd::FileDialog::new()
+                        .set_title("Open a photograph")
+                        .add_filter("Photographs", PHOTOGRAPHS)
                         .add_filter("All files", &["*"])
                         .pick_file(),
                     Purpose::Save(name) => rfd::FileDialog::new()
@@ -91,6 +106,7 @@ fn is_missing(purpose: &Purpose, banners: &mut Banners, log: &mut Log) {
         Purpose::Open => {
             "start with `intrados view FILE`, drop the file on the window, or type its path on the start screen"
         }
+        Purpose::Photograph => "drop the photograph on the window, or type its path",
         Purpose::Save(_) => "type the file's name instead",
     };
     log.say(format!("no file dialog on this system: {instead}"));
@@ -109,6 +125,7 @@ pub(crate) fn take(
     let Some(chosen) = task.poll() else { return };
     match (purpose, chosen.ok().flatten()) {
         (Purpose::Open, Some(path)) => actions.ask(Action::Open(path)),
+        (Purpose::Photograph, Some(path)) => actions.ask(Action::Photograph(path)),
         (Purpose::Save(_), Some(path)) => export.path = path.display().to_string(),
         (purpose, None) if since.elapsed() < TOO_SOON => {
             is_missing(purpose, &mut banners, &mut log)

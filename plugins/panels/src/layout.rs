@@ -21,11 +21,12 @@ use intrados_stage::{Jobs, Pace, catch};
 use crate::{
     Action, Actions, Banners, Log, Look, Place, Selection, banner,
     ct::Ct,
-    dialog::Dialogs,
+    dialog::{self, Dialogs},
     export::{self, Export},
     fields::Fields,
     log,
     outline::Outline,
+    photos::Photos,
     picture::Picture,
     place::{Panel, Panels},
     recent::Recent,
@@ -109,6 +110,7 @@ pub fn is_busy(world: &mut World) -> bool {
         || world.resource::<Dialogs>().is_open()
         || world.resource::<Outline>().is_busy()
         || world.resource::<Ct>().is_busy()
+        || world.resource::<Photos>().is_busy()
         || world.resource::<Stress>().is_busy()
         || world.resource::<Export>().is_busy()
         || world.resource::<Report>().is_busy()
@@ -118,7 +120,10 @@ pub fn is_busy(world: &mut World) -> bool {
 pub fn show(ui: &mut Ui, world: &mut World) {
     let dropped = ui.input(|i| i.raw.dropped_files.iter().map(|f| f.path().to_owned()).next_back());
     if let Some(path) = dropped {
-        world.resource_mut::<Actions>().ask(Action::Open(path));
+        let is_photograph =
+            dialog::is_photograph(&path) && world.contains_resource::<CurrentScene>();
+        let action = if is_photograph { Action::Photograph(path) } else { Action::Open(path) };
+        world.resource_mut::<Actions>().ask(action);
     }
     let look = *world.resource::<Look>();
     render::keys(ui, &look, &mut world.resource_mut::<Actions>());

@@ -18,6 +18,7 @@ mod meters;
 mod number;
 mod orbit;
 mod outline;
+mod photos;
 mod picture;
 mod place;
 mod plugin;
@@ -33,6 +34,7 @@ mod stress;
 mod surface;
 mod viewpoint;
 mod window;
+mod zoom;
 
 pub use action::{Action, Actions};
 pub use banner::Banners;

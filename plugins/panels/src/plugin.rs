@@ -9,8 +9,8 @@ use intrados_stage::Stage;
 use crate::{
     Actions, AddPanel, Banners, Latest, Log, Look, Place, Refine, Selection, Statistics, Viewpoint,
     action, banner, convergence, ct, dialog, directions, export, fields, inspector, layout, log,
-    members, meters, outline, picture, place::Panels, prediction, recent, refine, render, report,
-    statistics, steering, stress, viewpoint,
+    members, meters, outline, photos, picture, place::Panels, prediction, recent, refine, render,
+    report, statistics, steering, stress, viewpoint,
 };
 
 /// Adds the window's state and the built-in panels. It opens no window: whoever has one calls
@@ -54,6 +54,7 @@ impl Plugin for PanelsPlugin {
             .insert_resource(dialog::Dialogs::new(self.dialogs))
             .init_resource::<export::Export>()
             .init_resource::<ct::Ct>()
+            .init_resource::<photos::Photos>()
             .init_resource::<stress::Stress>()
             .init_resource::<report::Report>()
             .init_resource::<layout::Layout>()
@@ -93,6 +94,7 @@ impl Plugin for PanelsPlugin {
             .add_panel(Place::Bottom, "Jobs", log::jobs)
             .add_panel(Place::Bottom, "Log", log::log)
             .add_panel(Place::Tab, "Render", render::render)
+            .add_panel(Place::Tab, "Photos", photos::photos)
             .add_panel(Place::Tab, "CT", ct::ct)
             .add_panel(Place::Tab, "Stress", stress::stress)
             .add_panel(Place::Tab, "Report", report::report);

@@ -183,6 +183,14 @@ impl Surface {
         self.length
     }
 
+    /// Where in the world places of a face (across, along, m) lie, m, and the unit normals there;
+    /// `None` where nothing is.
+    #[must_use]
+    pub fn places(&self, face: &Face, at: &[[f64; 2]]) -> Vec<Option<[DVec3; 2]>> {
+        let spots = self.spots(face, at, &mut Scratch::default());
+        spots.into_iter().map(|s| s.map(|s| [s.place.as_dvec3(), s.normal])).collect()
+    }
+
     /// What of the surface lies at places (across, along, m) of a face; `None` where nothing does.
     pub(crate) fn spots(
         &self,

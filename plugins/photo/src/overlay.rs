@@ -37,8 +37,8 @@ impl Overlay {
         picks: &[Pick],
         site: &Site,
     ) -> Self {
-        let shrink = photograph.size[0].max(photograph.size[1]).div_ceil(LONGEST).max(1);
-        let mut overlay = Self::shrunk(photograph, shrink);
+        let shrink = shrink(photograph);
+        let mut overlay = Self::plain(photograph);
         let to_overlay = |[x, y]: [f64; 2]| [x / f64::from(shrink), y / f64::from(shrink)];
         let thickness = (f64::from(overlay.size[0]) / 900.0).clamp(0.7, 2.0);
         for place in edges.iter().flat_map(|edge| seen(pose, edge, site, f64::from(shrink))) {
@@ -63,7 +63,10 @@ impl Overlay {
         overlay
     }
 
-    fn shrunk(photograph: &Photograph, shrink: u32) -> Self {
+    /// The photograph alone, made smaller where it is large.
+    #[must_use]
+    pub fn plain(photograph: &Photograph) -> Self {
+        let shrink = shrink(photograph);
         let size = photograph.size.map(|n| (n / shrink).max(1));
         let mut rgb = Vec::with_capacity(3 * size[0] as usize * size[1] as usize);
         for y in 0..size[1] {
@@ -91,6 +94,11 @@ impl Overlay {
             }
         }
     }
+}
+
+/// So many pixels of a photograph are one of its overlay.
+fn shrink(photograph: &Photograph) -> u32 {
+    photograph.size[0].max(photograph.size[1]).div_ceil(LONGEST).max(1)
 }
 
 /// Points of an edge that the camera sees, so close that they make a line.

@@ -11,11 +11,10 @@
 use intrados_ct::{Picture, picture::CRACK};
 use intrados_damage::zone::{ZONES, zone_at};
 use intrados_photo::{
-    Located, Photograph, Prior, Site,
+    Located, Photograph, Pick, Prior, Site,
     face::{Chart, Surface},
     locate,
     map::{FaceMap, MapError},
-    picks,
     picture::srgb,
     reading::{Defect, FaceReading, ReadFace, read_all},
     relight::{RelightError, RelightSettings, relight},
@@ -62,6 +61,30 @@ fn because(why: impl std::fmt::Display) -> PhotoError {
     PhotoError::Because(why.to_string())
 }
 
+/// What is known of a photograph before anything is picked in it.
+#[must_use]
+pub fn prior(photo: &Photographed, photograph: &Photograph) -> Prior {
+    let known = photo.focal_px.map(|px| Focal { px, rel_error: 0.0 });
+    Prior {
+        size: photograph.size,
+        focal: known.or_else(|| photograph.taken.focal(photograph.size)),
+        lens: Lens::default(),
+        k1_error: K1_ERROR,
+        picking_px: photo.picking_px,
+    }
+}
+
+/// The picks that its table has of a photograph.
+///
+/// # Errors
+/// File, line and remedy.
+pub fn picks(photo: &Photographed, scene: &Scene, site: &Site) -> Result<Vec<Pick>, PhotoError> {
+    let name = photo.file.file_name().map(|n| n.to_string_lossy().into_owned());
+    let all = intrados_photo::picks::read(&photo.picks, scene, site).map_err(because)?;
+    let of_it = all.iter().filter(|p| p.photo.is_none() || p.photo == name);
+    Ok(of_it.map(|p| p.pick).collect())
+}
+
 /// Opens a photograph and finds out where it was taken from.
 ///
 /// # Errors
@@ -73,18 +96,8 @@ pub fn placed(
 ) -> Result<(Photograph, Site, Located), PhotoError> {
     let photograph = Photograph::open(&photo.file).map_err(because)?;
     let site = Site::new(scene, job)?;
-    let name = photo.file.file_name().map(|n| n.to_string_lossy().into_owned());
-    let all = picks::read(&photo.picks, scene, &site).map_err(because)?;
-    let of_it = all.iter().filter(|p| p.photo.is_none() || p.photo == name);
-    let picks: Vec<_> = of_it.map(|p| p.pick).collect();
-    let known = photo.focal_px.map(|px| Focal { px, rel_error: 0.0 });
-    let prior = Prior {
-        size: photograph.size,
-        focal: known.or_else(|| photograph.taken.focal(photograph.size)),
-        lens: Lens::default(),
-        k1_error: K1_ERROR,
-        picking_px: photo.picking_px,
-    };
+    let picks = picks(photo, scene, &site)?;
+    let prior = prior(photo, &photograph);
     let located = locate(&picks, &prior, &|pose| site.admits(pose, &picks)).map_err(because)?;
     Ok((photograph, site, located))
 }
@@ -111,19 +124,33 @@ impl Shown {
 /// # Errors
 /// It cannot be read, placed or relit, it shows nothing of the member, or the job was cancelled.
 pub fn observed(scene: &Scene, photo: &Photographed, job: &Job) -> Result<Shown, PhotoError> {
+    let (photograph, site, located) = placed(scene, photo, job)?;
+    let (surface, faces) = faces(scene, photo, &site, (&photograph, &located), job)?;
+    Ok(observations(photo, surface, &faces))
+}
+
+/// The faces of its member that a placed photograph shows, without the light on them, read.
+///
+/// # Errors
+/// It cannot be relit, it shows nothing of the member, or the job was cancelled.
+pub fn faces<'a>(
+    scene: &Scene,
+    photo: &Photographed,
+    site: &'a Site,
+    shot: (&Photograph, &Located),
+    job: &Job,
+) -> Result<(&'a Surface, Vec<ReadFace>), PhotoError> {
     let member = scene.members.iter().position(|m| m.id == photo.member);
     let member = member.ok_or_else(|| because("its member is lost"))?;
-    let (photograph, site, located) = placed(scene, photo, job)?;
     let settings =
         RelightSettings { shadow_error_m: photo.shadow_error_m, ..RelightSettings::default() };
-    let shot = (&photograph, &located);
-    let relit = match relight(&site, scene, shot, &settings, &job.part(0.0, 0.7)) {
+    let relit = match relight(site, scene, shot, &settings, &job.part(0.0, 0.7)) {
         Ok(relit) => relit,
         Err(RelightError::Cancelled(cancelled)) => return Err(cancelled.into()),
         Err(why) => return Err(because(why)),
     };
     let faces = match read_all(
-        &site,
+        site,
         scene,
         (Some(&relit), Some(member)),
         shot,
@@ -134,20 +161,19 @@ pub fn observed(scene: &Scene, photo: &Photographed, job: &Job) -> Result<Shown,
         Err(MapError::Cancelled(cancelled)) => return Err(cancelled.into()),
         Err(why) => return Err(because(why)),
     };
-    let own: Vec<&ReadFace> = faces.iter().collect();
-    let Some(surface) = site.surface(member).filter(|_| !own.is_empty()) else {
+    let Some(surface) = site.surface(member).filter(|_| !faces.is_empty()) else {
         return Err(because("it shows nothing of the member: give it to one that it shows"));
     };
-    let seen: f64 = own.iter().flat_map(|f| &f.reading.seen_m2).sum();
+    let seen: f64 = faces.iter().flat_map(|f| &f.reading.seen_m2).sum();
     if seen <= 0.0 {
         let why = "of what it shows of the member no reflectance is known: shadow, glare, or a view that is too flat";
         return Err(because(why));
     }
-    Ok(observations(photo, surface, &own))
+    Ok((surface, faces))
 }
 
 /// What was found and what was not, face by face and zone by zone.
-fn observations(photo: &Photographed, surface: &Surface, faces: &[&ReadFace]) -> Shown {
+fn observations(photo: &Photographed, surface: &Surface, faces: &[ReadFace]) -> Shown {
     let length = surface.length();
     let observation = |name: String, spot: Spot, shows: Shows| Observation {
         member: photo.member.clone(),

@@ -17,11 +17,10 @@ use intrados_predict::Predicting;
 use intrados_scene::{Member, Scene, plugin::CurrentScene};
 use intrados_stage::{Estimate, Jobs, Task};
 use intrados_xray::plugin::{Scan, Scans};
-use picture::View;
 use plots::Order;
 use source::{Read, Source};
 
-use crate::{Actions, Selection, members};
+use crate::{Actions, Selection, members, zoom::Zoom};
 
 /// Width of what stands beside the slice, points.
 const ASIDE: f32 = 290.0;
@@ -50,7 +49,7 @@ pub(crate) struct Ct {
     overlay: Overlay,
     /// Grey that is black and grey that is white; none: what suits the slice.
     window: Option<[f32; 2]>,
-    view: View,
+    view: Zoom,
     sinogram: bool,
     shelf: SliceShelf,
     wish: scan::Wish,
@@ -235,7 +234,7 @@ fn ask(
         // Of the same stack the slice before stays until the new one is there.
         let same = ct.of.as_ref().is_some_and(|(of, _)| *of == stack);
         if !same {
-            (ct.shown, ct.view) = (None, View::default());
+            (ct.shown, ct.view) = (None, Zoom::default());
         }
         ct.picked = None;
         ct.of = Some(wanted);

@@ -6,55 +6,11 @@ use super::{Ct, Shown, draw, source::Read};
 use crate::{
     colours,
     number::{percent, significant},
+    zoom::Zoom,
 };
 
 /// A click so many points beside a pore still means it.
 const REACH: f32 = 6.0;
-/// Largest magnification over all of the slice.
-const CLOSEST: f32 = 64.0;
-
-/// Which part of the slice is seen.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct View {
-    /// Over the size at which all of it is seen.
-    zoom: f32,
-    /// What is in the middle, as a share of the slice.
-    centre: [f32; 2],
-}
-
-impl Default for View {
-    fn default() -> Self {
-        Self { zoom: 1.0, centre: [0.5; 2] }
-    }
-}
-
-impl View {
-    /// Goes to a place (pixels) where not all of the slice is seen.
-    pub(super) fn reveal(&mut self, at: [f32; 2], size: [f32; 2]) {
-        if self.zoom > 1.05 {
-            self.centre = [at[0] / size[0], at[1] / size[1]];
-            self.hold();
-        }
-    }
-
-    /// Keeps the slice in sight.
-    fn hold(&mut self) {
-        self.zoom = self.zoom.clamp(1.0, CLOSEST);
-        let margin = 0.5 / self.zoom;
-        self.centre = self.centre.map(|c| c.clamp(margin, 1.0 - margin));
-    }
-
-    /// Where the whole slice would be drawn.
-    fn place(&self, rect: Rect, size: Vec2) -> Rect {
-        let scale = (rect.width() / size.x).min(rect.height() / size.y) * self.zoom;
-        let shown = size * scale;
-        Rect::from_min_size(
-            rect.center() - vec2(self.centre[0] * shown.x, self.centre[1] * shown.y),
-            shown,
-        )
-    }
-}
-
 pub(super) fn show(ui: &mut Ui, ct: &mut Ct, rect: Rect, unit: &str) {
     let (strip, rect) = rect.split_top_bottom_at_y(rect.top() + 18.0);
     let response = ui.allocate_rect(rect, Sense::click_and_drag());
@@ -125,13 +81,12 @@ pub(super) fn show(ui: &mut Ui, ct: &mut Ct, rect: Rect, unit: &str) {
 fn hand(
     ui: &Ui,
     response: &Response,
-    view: &mut View,
+    view: &mut Zoom,
     window: &mut Option<[f32; 2]>,
     read: &Read,
     rect: Rect,
     size: Vec2,
 ) {
-    let place = view.place(rect, size);
     let delta = response.drag_delta();
     if response.dragged_by(PointerButton::Secondary) {
         let [low, high] = window.unwrap_or_else(|| read.suitable());
@@ -140,23 +95,9 @@ fn hand(
         let level = 0.5 * (low + high) - 0.002 * unit * delta.y;
         *window = Some([level - 0.5 * width, level + 0.5 * width]);
     } else if response.dragged() {
-        view.centre =
-            [view.centre[0] - delta.x / place.width(), view.centre[1] - delta.y / place.height()];
+        view.pull(delta, rect, size);
     }
-    let scroll = if response.hovered() { ui.input(|i| i.smooth_scroll_delta().y) } else { 0.0 };
-    if scroll != 0.0
-        && let Some(at) = response.hover_pos()
-    {
-        let before = (at - place.min) / place.size();
-        view.zoom = (view.zoom * (0.004 * scroll).exp()).clamp(1.0, CLOSEST);
-        let after = view.place(rect, size);
-        let now = (at - after.min) / after.size();
-        view.centre = [view.centre[0] + before.x - now.x, view.centre[1] + before.y - now.y];
-    }
-    if response.double_clicked() {
-        *view = View::default();
-    }
-    view.hold();
+    view.hand(ui, response, rect, size);
 }
 
 /// New pixels where window or labels have changed.

@@ -1,0 +1,583 @@
+//! The Photos tab: corners picked in a photograph and on the member say where it was taken from;
+//! then what it shows of the member, without the light, is read.
+
+mod model;
+mod sheet;
+mod work;
+
+use std::{path::PathBuf, sync::Arc};
+
+use bevy_ecs::prelude::*;
+use egui::{ComboBox, Rect, ScrollArea, TextureHandle, TextureOptions, Ui, pos2};
+use glam::DVec3;
+use intrados_photo::{Located, Pick};
+use intrados_scene::{Member, Scene, plugin::CurrentScene, structure::Photographed};
+use intrados_stage::{Access, Jobs, Task};
+use model::Turn;
+use work::{Face, Opened, Picked, Placed};
+
+use crate::{Action, Actions, Banners, Log, Selection, Viewpoint, members, zoom::Zoom};
+
+/// Width of what stands beside the photograph, points.
+const ASIDE: f32 = 310.0;
+/// Fewest picks of which a place can be made.
+const FEWEST: usize = 4;
+/// From so far a find is looked at in the model, m.
+const NEAR: f64 = 1.2;
+
+/// What is open: the scene's hash, the member's id, the photograph.
+type Key = (String, String, PathBuf);
+
+/// What the tab remembers.
+#[derive(Resource, Default)]
+pub(crate) struct Photos {
+    /// What is typed.
+    path: String,
+    /// The photograph that is looked at; none: the member's first.
+    chosen: Option<PathBuf>,
+    of: Option<Key>,
+    opening: Option<Task<Result<Opened, String>>>,
+    shot: Option<Result<Shot, String>>,
+    attaching: Option<Task<Result<String, String>>>,
+    zoom: Zoom,
+    turn: Turn,
+    /// The corner that the next click in the photograph is of.
+    armed: Option<usize>,
+    /// The face that is looked at instead of the photograph.
+    face: Option<usize>,
+    /// Member and name of what was added to the evidence: looked at once the scene is there again.
+    added: Option<[String; 2]>,
+    /// The find that was clicked: of which face, which one.
+    marked: Option<[usize; 2]>,
+}
+
+/// A photograph that is open.
+struct Shot {
+    opened: Opened,
+    texture: TextureHandle,
+    picks: Vec<Picked>,
+    /// Picks have changed since the place was last asked for.
+    is_moved: bool,
+    is_saved: bool,
+    placing: Option<Task<Result<Placed, String>>>,
+    located: Option<Result<Located, String>>,
+    reading: Option<Task<Result<Vec<Face>, String>>>,
+    faces: Vec<(Face, TextureHandle)>,
+    /// What reading has come to, where it came to nothing.
+    failure: Option<String>,
+}
+
+impl Photos {
+    pub(crate) fn is_busy(&self) -> bool {
+        let shot = self.shot.iter().flatten();
+        self.opening.is_some()
+            || self.attaching.is_some()
+            || shot.into_iter().any(|s| s.placing.is_some() || s.reading.is_some() || s.is_moved)
+    }
+
+    /// Looks at a photograph that somebody has brought.
+    pub(crate) fn show(&mut self, path: PathBuf) {
+        self.path = path.display().to_string();
+        self.chosen = Some(path);
+    }
+}
+
+impl Shot {
+    fn located(&self) -> Option<&Located> {
+        self.located.as_ref()?.as_ref().ok()
+    }
+
+    /// A corner of the member is there.
+    fn pick(&mut self, corner: usize, pixel: [f64; 2]) {
+        let place = self.opened.outline.corners[corner];
+        let picked = Picked { pick: Pick { pixel, place }, corner: Some(corner) };
+        match self.picks.iter_mut().find(|p| p.corner == Some(corner)) {
+            Some(known) => *known = picked,
+            None => self.picks.push(picked),
+        }
+        self.moved();
+    }
+
+    fn moved(&mut self) {
+        (self.is_moved, self.is_saved) = (true, false);
+        // What was read was read from another place.
+        self.faces.clear();
+        self.reading = None;
+    }
+
+    /// Asks for the place that the picks tell.
+    fn place(&mut self, jobs: &mut Jobs) {
+        if !std::mem::take(&mut self.is_moved) {
+            return;
+        }
+        if self.picks.len() < FEWEST {
+            (self.placing, self.located) = (None, None);
+            return;
+        }
+        let Opened { photo, photograph, site, outline, .. } = &self.opened;
+        let (photo, photograph, site) = (photo.clone(), Arc::clone(photograph), Arc::clone(site));
+        let edges: Vec<[DVec3; 2]> = outline.edges.clone();
+        let picks: Vec<Pick> = self.picks.iter().map(|p| p.pick).collect();
+        self.placing = Some(Task::spawn_unlisted(jobs, "placing a photograph", move |_| {
+            work::place(&photo, &photograph, &site, &edges, &picks)
+        }));
+    }
+
+    fn read(&mut self, scene: &Arc<Scene>, jobs: &mut Jobs) {
+        let Some(located) = self.located().cloned() else { return };
+        let Opened { photo, photograph, site, .. } = &self.opened;
+        let (photo, photograph, site) = (photo.clone(), Arc::clone(photograph), Arc::clone(site));
+        let scene = Arc::clone(scene);
+        (self.faces, self.failure) = (Vec::new(), None);
+        self.reading = Some(Task::spawn(jobs, "reading a photograph", move |job| {
+            work::read(&scene, &photo, &site, (&photograph, &located), job)
+        }));
+    }
+
+    /// Takes what has come.
+    fn collect(&mut self, ui: &Ui) {
+        if let Some(done) = Task::take(&mut self.placing) {
+            self.located = Some(match done {
+                Ok(Ok(Placed { located, picture })) => {
+                    self.texture.set(picture, TextureOptions::LINEAR);
+                    Ok(located)
+                }
+                Ok(Err(why)) => Err(why),
+                Err(_) => Err("placing it broke off".into()),
+            });
+        }
+        match Task::take(&mut self.reading) {
+            Some(Ok(Ok(faces))) => {
+                let load = |face: Face| {
+                    let options = TextureOptions::LINEAR;
+                    let texture = ui.ctx().load_texture("face", face.picture.clone(), options);
+                    (face, texture)
+                };
+                self.faces = faces.into_iter().map(load).collect();
+            }
+            Some(Ok(Err(why))) => self.failure = Some(why),
+            Some(Err(_)) => self.failure = Some("reading it broke off".into()),
+            None => {}
+        }
+    }
+}
+
+pub(crate) fn photos(
+    InMut(ui): InMut<Ui>,
+    scene: Option<Res<CurrentScene>>,
+    selection: Res<Selection>,
+    access: Res<Access>,
+    mut photos: ResMut<Photos>,
+    mut jobs: ResMut<Jobs>,
+    mut actions: ResMut<Actions>,
+    mut viewpoint: ResMut<Viewpoint>,
+    mut banners: ResMut<Banners>,
+    mut log: ResMut<Log>,
+) {
+    let photos = photos.bypass_change_detection();
+    let Some(scene) = scene else { return };
+    let scene = &scene.0;
+    return_to(photos, scene, *selection, &mut actions);
+    let Some(member) = selection.0.and_then(|i| scene.members.get(i)) else {
+        let none = "This scene has no structural members.";
+        let why = "Select the member that a photograph is of:";
+        return members::choose(ui, scene, |_| true, why, none, &mut actions);
+    };
+    settle(photos, &mut actions, &mut banners, &mut log);
+    choose(ui, photos, scene, member, &mut actions);
+    ask(photos, scene, member, &mut jobs);
+    let area = ui.available_rect_before_wrap();
+    collect(ui, photos);
+    match &mut photos.shot {
+        None if photos.opening.is_some() => {
+            ui.vertical_centered(Ui::spinner);
+            return;
+        }
+        None => {
+            ui.label("Photographs of this member that evidence names stand here. Open another one, or drop it on the window.");
+            return;
+        }
+        Some(Err(why)) => {
+            ui.label(format!("⚠ {why}"));
+            return;
+        }
+        Some(Ok(shot)) => shot.place(&mut jobs),
+    }
+    let left = Rect::from_min_max(
+        area.min,
+        pos2((area.right() - ASIDE - 8.0).max(area.left() + 120.0), area.bottom()),
+    );
+    let right = Rect::from_min_max(pos2(left.right() + 8.0, area.top()), area.max);
+    sheet::show(ui, photos, left);
+    ui.scope_builder(egui::UiBuilder::new().max_rect(right), |ui| {
+        aside(ui, photos, scene, &access, &mut jobs, &mut actions, &mut viewpoint);
+    });
+    ui.advance_cursor_after_rect(area);
+}
+
+/// Which photograph.
+fn choose(ui: &mut Ui, photos: &mut Photos, scene: &Scene, member: &Member, actions: &mut Actions) {
+    let told: Vec<&Photographed> = of_member(scene, member).collect();
+    if photos.chosen.is_none() {
+        photos.chosen = told.first().map(|p| p.file.clone());
+    }
+    ui.horizontal_wrapped(|ui| {
+        ui.strong(&member.name);
+        ui.separator();
+        for photo in &told {
+            let is_it = photos.chosen.as_ref() == Some(&photo.file);
+            let button = ui.selectable_label(is_it, &photo.name);
+            if button.on_hover_text(photo.file.display().to_string()).clicked() {
+                photos.chosen = Some(photo.file.clone());
+            }
+        }
+        let field = egui::TextEdit::singleline(&mut photos.path)
+            .desired_width(180.0)
+            .hint_text("path of a photograph");
+        let entered = ui.add(field).lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter));
+        let can = !photos.path.trim().is_empty();
+        let go = ui.add_enabled(can, egui::Button::new("Open photograph"));
+        if can && (entered || go.clicked()) {
+            photos.chosen = Some(PathBuf::from(photos.path.trim()));
+        }
+        if ui.button("Browse…").on_hover_text("JPEG, PNG or TIFF").clicked() {
+            actions.ask(Action::ChoosePhotograph);
+        }
+        faces(ui, photos);
+    });
+}
+
+/// The photograph, or one of its faces.
+fn faces(ui: &mut Ui, photos: &mut Photos) {
+    let Photos { shot: Some(Ok(shot)), face, .. } = photos else { return };
+    *face = face.filter(|k| *k < shot.faces.len());
+    if shot.faces.is_empty() {
+        return;
+    }
+    let name = |k: Option<usize>| {
+        let face = k.and_then(|k| shot.faces.get(k));
+        face.map_or("Photograph", |(f, _)| f.name.as_str())
+    };
+    ui.separator();
+    let before = *face;
+    let combo = ComboBox::from_id_salt("photo face").selected_text(name(*face)).width(110.0);
+    combo.show_ui(ui, |ui| {
+        ui.selectable_value(face, None, name(None));
+        for k in 0..shot.faces.len() {
+            ui.selectable_value(face, Some(k), name(Some(k)));
+        }
+    });
+    if *face != before {
+        photos.zoom = Zoom::default();
+    }
+}
+
+fn of_member<'a>(scene: &'a Scene, member: &'a Member) -> impl Iterator<Item = &'a Photographed> {
+    scene.structure.photographs.iter().filter(|p| p.member == member.id)
+}
+
+/// Opens what was chosen, if it is another one.
+fn ask(photos: &mut Photos, scene: &Arc<Scene>, member: &Member, jobs: &mut Jobs) {
+    let Some(file) = photos.chosen.clone() else {
+        (photos.of, photos.shot, photos.opening) = (None, None, None);
+        return;
+    };
+    let key = (scene.hash.clone(), member.id.clone(), file);
+    if photos.of.as_ref() == Some(&key) {
+        return;
+    }
+    let is_other = photos.of.as_ref().is_some_and(|(_, id, _)| *id != member.id);
+    photos.of = Some(key.clone());
+    (photos.shot, photos.armed, photos.face, photos.marked) = (None, None, None, None);
+    photos.zoom = Zoom::default();
+    let told = of_member(scene, member).find(|p| p.file == key.2).cloned();
+    // Of another member its own photographs are looked at first.
+    if told.is_none() && is_other {
+        photos.chosen = of_member(scene, member).next().map(|p| p.file.clone());
+        photos.of = None;
+        return;
+    }
+    let photo = told.unwrap_or_else(|| work::own(key.2, &member.id));
+    let scene = Arc::clone(scene);
+    photos.opening =
+        Some(Task::spawn(jobs, "opening a photograph", move |job| work::open(&scene, photo, job)));
+}
+
+/// Takes what has come.
+fn collect(ui: &Ui, photos: &mut Photos) {
+    if let Some(done) = Task::take(&mut photos.opening) {
+        photos.shot = Some(match done {
+            Ok(Ok(mut opened)) => {
+                let options = TextureOptions::LINEAR;
+                let texture = ui.ctx().load_texture("photo", opened.picture.clone(), options);
+                let picks = std::mem::take(&mut opened.picks);
+                Ok(Shot {
+                    opened,
+                    texture,
+                    is_moved: !picks.is_empty(),
+                    is_saved: !picks.is_empty(),
+                    picks,
+                    placing: None,
+                    located: None,
+                    reading: None,
+                    faces: Vec::new(),
+                    failure: None,
+                })
+            }
+            Ok(Err(why)) => Err(why),
+            Err(_) => Err("opening it broke off".into()),
+        });
+    }
+    if let Some(Ok(shot)) = &mut photos.shot {
+        shot.collect(ui);
+    }
+}
+
+/// Goes to what was added, after the scene was loaded anew for it.
+fn return_to(photos: &mut Photos, scene: &Scene, selection: Selection, actions: &mut Actions) {
+    let Some([member, name]) = &photos.added else { return };
+    let photo = scene.structure.photographs.iter().find(|p| p.member == *member && p.name == *name);
+    let (Some(photo), None) = (photo, selection.0) else { return };
+    let index = scene.members.iter().position(|m| m.id == *member);
+    photos.chosen = Some(photo.file.clone());
+    photos.added = None;
+    actions.ask(Action::Select(index));
+}
+
+/// What has become of evidence that was added.
+fn settle(photos: &mut Photos, actions: &mut Actions, banners: &mut Banners, log: &mut Log) {
+    match Task::take(&mut photos.attaching) {
+        Some(Ok(Ok(name))) => {
+            log.say(format!("attached {name}"));
+            let member = photos.of.as_ref().map(|(_, member, _)| member.clone());
+            photos.added = member.map(|member| [member, name]);
+            actions.ask(Action::Reload);
+        }
+        Some(Ok(Err(why))) => {
+            log.say(format!("not attached: {why}"));
+            banners.cannot("The photograph was not attached", &why);
+        }
+        Some(Err(_)) => banners.cannot("The photograph was not attached", "the work broke off"),
+        None => {}
+    }
+}
+
+/// The drawing, the picks, what to do with them, and what was found.
+fn aside(
+    ui: &mut Ui,
+    photos: &mut Photos,
+    scene: &Arc<Scene>,
+    access: &Access,
+    jobs: &mut Jobs,
+    actions: &mut Actions,
+    viewpoint: &mut Viewpoint,
+) {
+    let height = (0.4 * ui.available_height()).clamp(90.0, 260.0);
+    let Photos { shot: Some(Ok(shot)), armed, turn, marked, face, attaching, .. } = photos else {
+        return;
+    };
+    let is_picked = |k: usize| shot.picks.iter().any(|p| p.corner == Some(k));
+    if let Some(corner) = model::show(ui, &shot.opened.outline, turn, *armed, is_picked, height) {
+        *armed = Some(corner);
+        *face = None;
+    }
+    stand(ui, shot, actions, viewpoint);
+    ui.horizontal_wrapped(|ui| {
+        let is_placed = shot.located().is_some();
+        if let Some(task) = &shot.reading {
+            if ui.small_button("⏹ Stop reading").clicked() {
+                task.job().cancel();
+            }
+            ui.add(egui::ProgressBar::new(task.job().done()).desired_width(110.0));
+        } else if ui
+            .add_enabled(is_placed, egui::Button::new("Read it"))
+            .on_hover_text("Takes the light off and looks for cracks, missing cover and stains")
+            .clicked()
+        {
+            shot.read(scene, jobs);
+        }
+        keep(ui, shot, attaching, scene, access, jobs, actions);
+    });
+    if let Some(why) = &shot.failure {
+        ui.label(format!("⚠ Not read: {why}"));
+    }
+    ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+        finds(ui, shot, marked, actions, viewpoint);
+        corners(ui, shot, armed);
+    });
+}
+
+/// Where it was taken from.
+fn stand(ui: &mut Ui, shot: &Shot, actions: &mut Actions, viewpoint: &mut Viewpoint) {
+    match &shot.located {
+        None if shot.placing.is_some() => drop(ui.weak("placing…")),
+        None => {
+            let picked = shot.picks.len();
+            ui.weak(format!(
+                "{picked} picked; 4 are needed where the focal length is known, else 6"
+            ));
+        }
+        Some(Err(why)) => drop(ui.label(format!("⚠ {why}"))),
+        Some(Ok(located)) => {
+            let [x, y, z] = located.pose.position.to_array();
+            ui.horizontal_wrapped(|ui| {
+                ui.label(format!(
+                    "Taken from ({x:.2}, {y:.2}, {z:.2}) m; picks fit to {:.1} px",
+                    located.rms_px
+                ));
+                let button = ui.small_button("Look from there");
+                if button.on_hover_text("The picture as the camera stood").clicked() {
+                    viewpoint.go(located.pose.camera(&shot.opened.photo.name));
+                    actions.ask(Action::Tab("Render"));
+                }
+            });
+            if let Some(k) = located.left_out {
+                ui.label(format!("⚠ pick {} contradicts the others and is left out", k + 1));
+            }
+            if located.other.is_some() {
+                ui.label("⚠ another place fits nearly as well: pick a point out of the plane");
+            }
+        }
+    }
+}
+
+/// Saves the picks; makes evidence of a photograph that is none yet.
+fn keep(
+    ui: &mut Ui,
+    shot: &mut Shot,
+    attaching: &mut Option<Task<Result<String, String>>>,
+    scene: &Arc<Scene>,
+    access: &Access,
+    jobs: &mut Jobs,
+    actions: &mut Actions,
+) {
+    let photo = &shot.opened.photo;
+    let is_told = scene.structure.photographs.contains(photo);
+    let can = shot.located().is_some() && !scene.path.as_os_str().is_empty();
+    let save = |shot: &mut Shot| match work::save(&shot.opened.photo, &shot.picks) {
+        Ok(()) => {
+            shot.is_saved = true;
+            true
+        }
+        Err(why) => {
+            shot.failure = Some(why);
+            false
+        }
+    };
+    if is_told {
+        let button = ui.add_enabled(can && !shot.is_saved, egui::Button::new("Save picks"));
+        if button.on_hover_text(photo.picks.display().to_string()).clicked() && save(shot) {
+            actions.ask(Action::Reload);
+        }
+    } else {
+        let can = can && attaching.is_none() && scene.path.exists();
+        let button = ui.add_enabled(can, egui::Button::new("Add to the evidence"));
+        let button = button
+            .on_hover_text("Copies it and its picks beside the scene: `intrados attach`")
+            .on_disabled_hover_text(
+                "Six corners first; a bundled scene has no folder to put it in: `intrados new`",
+            );
+        if button.clicked() && save(shot) {
+            let (path, photo) = (scene.path.clone(), shot.opened.photo.clone());
+            let access = access.clone();
+            *attaching = Some(Task::spawn(jobs, "attaching a photograph", move |job| {
+                work::attach(&path, &photo, &access, job)
+            }));
+        }
+    }
+}
+
+/// What was found, face by face.
+fn finds(
+    ui: &mut Ui,
+    shot: &Shot,
+    marked: &mut Option<[usize; 2]>,
+    actions: &mut Actions,
+    viewpoint: &mut Viewpoint,
+) {
+    for (k, (face, _)) in shot.faces.iter().enumerate() {
+        let known = 100.0 * face.known;
+        ui.strong(&face.name).on_hover_text(format!("{known:.0} % of its map is known"));
+        if face.finds.is_empty() {
+            let limit = face.narrowest_mm;
+            ui.weak(match limit {
+                Some(mm) => format!("nothing; of cracks narrower than {mm:.2} mm nothing is said"),
+                None => "too little is seen to tell".to_owned(),
+            });
+        }
+        for (i, find) in face.finds.iter().enumerate() {
+            let is_marked = *marked == Some([k, i]);
+            let row = ui.selectable_label(is_marked, &find.what).on_hover_text(&find.course);
+            if row.clicked() {
+                *marked = (!is_marked).then_some([k, i]);
+            }
+            let Some([place, normal]) = find.at.filter(|_| is_marked) else { continue };
+            ui.horizontal(|ui| {
+                ui.weak(&find.course);
+                if ui.small_button("Look at it").clicked()
+                    && let Some(mut camera) = viewpoint.camera().cloned()
+                {
+                    camera.position = (place + NEAR * normal).as_vec3();
+                    camera.target = place.as_vec3();
+                    viewpoint.go(camera);
+                    actions.ask(Action::Tab("Render"));
+                }
+            });
+        }
+    }
+    if !shot.faces.is_empty() {
+        ui.separator();
+    }
+}
+
+/// A row for each corner, with its pick if it has one.
+fn corners(ui: &mut Ui, shot: &mut Shot, armed: &mut Option<usize>) {
+    let residual = |k: usize| {
+        let [x, y] = *shot.located()?.residuals.get(k)?;
+        Some(x.hypot(y))
+    };
+    let mut gone = None;
+    egui::Grid::new("photo corners").num_columns(3).striped(true).show(ui, |ui| {
+        for (k, place) in shot.opened.outline.corners.iter().enumerate() {
+            let [x, y, z] = place.to_array();
+            let is_armed = *armed == Some(k);
+            let row = ui.selectable_label(is_armed, format!("Corner {}", k + 1));
+            if row.on_hover_text(format!("({x:.3}, {y:.3}, {z:.3}) m")).clicked() {
+                *armed = (!is_armed).then_some(k);
+            }
+            let pick = shot.picks.iter().position(|p| p.corner == Some(k));
+            pick_cells(ui, shot, pick, residual, &mut gone);
+            ui.end_row();
+        }
+        for k in (0..shot.picks.len()).filter(|k| shot.picks[*k].corner.is_none()) {
+            let [x, y, z] = shot.picks[k].pick.place.to_array();
+            ui.label(format!("({x:.2}, {y:.2}, {z:.2})"));
+            pick_cells(ui, shot, Some(k), residual, &mut gone);
+            ui.end_row();
+        }
+    });
+    if let Some(k) = gone {
+        shot.picks.remove(k);
+        shot.moved();
+    }
+}
+
+/// Where a pick is, by how much it misses, and a button that takes it away.
+fn pick_cells(
+    ui: &mut Ui,
+    shot: &Shot,
+    pick: Option<usize>,
+    residual: impl Fn(usize) -> Option<f64>,
+    gone: &mut Option<usize>,
+) {
+    let Some(k) = pick else {
+        ui.weak("—");
+        return;
+    };
+    let [u, v] = shot.picks[k].pick.pixel;
+    let off = residual(k).map_or_else(String::new, |px| format!(", {px:.1} px off"));
+    ui.label(format!("{u:.0}, {v:.0}{off}"));
+    if ui.small_button("✖").on_hover_text("Take this pick away").clicked() {
+        *gone = Some(k);
+    }
+}

@@ -1,0 +1,282 @@
+//! What takes a while: opening, placing, reading, writing. All of it runs off the frame.
+
+use std::{
+    io::Write,
+    path::{Path, PathBuf},
+    sync::Arc,
+};
+
+use egui::{Color32, ColorImage};
+use glam::DVec3;
+use intrados_photo::{
+    Located, Photograph, Pick, Site,
+    corner::Outline,
+    face::Surface,
+    locate,
+    map::FaceMap,
+    overlay::Overlay,
+    picture::srgb,
+    reading::{Defect, ReadFace},
+};
+use intrados_scene::{
+    Scene,
+    attach::{Attachment, Project, What},
+    structure::Photographed,
+};
+use intrados_stage::{Access, Job, alone, file};
+use intrados_survey::photographed::{self, PhotoError};
+
+use crate::number::plus_minus;
+
+/// Longer side of a face's picture, pixels; larger maps are thinned.
+const SIDE: usize = 2048;
+/// A pick so near to a corner of the member is of that corner, m.
+const SAME: f64 = 1e-3;
+
+/// A photograph and the member that it is of.
+pub(super) struct Opened {
+    pub(super) photo: Photographed,
+    pub(super) photograph: Arc<Photograph>,
+    pub(super) site: Arc<Site>,
+    pub(super) outline: Outline,
+    pub(super) picture: ColorImage,
+    pub(super) picks: Vec<Picked>,
+}
+
+/// A place that was picked.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Picked {
+    pub(super) pick: Pick,
+    /// Index among the member's corners, if it is one.
+    pub(super) corner: Option<usize>,
+}
+
+/// Where a photograph was taken from, and how the model lies over it.
+pub(super) struct Placed {
+    pub(super) located: Located,
+    pub(super) picture: ColorImage,
+}
+
+/// A face that was read.
+pub(super) struct Face {
+    pub(super) name: String,
+    pub(super) picture: ColorImage,
+    /// Of the map, pixels.
+    pub(super) size: [f32; 2],
+    pub(super) mm_px: f64,
+    /// Share of the map that is known.
+    pub(super) known: f64,
+    pub(super) narrowest_mm: Option<f64>,
+    pub(super) finds: Vec<Find>,
+}
+
+/// One thing that was found.
+pub(super) struct Find {
+    pub(super) what: String,
+    pub(super) course: String,
+    /// On the face's map, pixels.
+    pub(super) on_map: Vec<[f64; 2]>,
+    /// In the photograph, pixels.
+    pub(super) in_photo: Vec<[f64; 2]>,
+    /// Its middle, m, and the unit normal there.
+    pub(super) at: Option<[DVec3; 2]>,
+}
+
+pub(super) fn open(scene: &Scene, photo: Photographed, job: &Job) -> Result<Opened, String> {
+    alone(|| {
+        let photograph = Photograph::open(&photo.file)
+            .map_err(|why| format!("{}: {why}", photo.file.display()))?;
+        let site = Site::new(scene, job).map_err(|why| why.to_string())?;
+        let member = scene.members.iter().position(|m| m.id == photo.member);
+        let outline = member.and_then(|m| site.surface(m)).map(Surface::outline);
+        let outline = outline.ok_or("this member has no surface of its own: choose another one")?;
+        let picks = if photo.picks.exists() {
+            photographed::picks(&photo, scene, &site).map_err(|why| why.to_string())?
+        } else {
+            Vec::new()
+        };
+        let picked = |pick: Pick| {
+            let corner = outline.corners.iter().position(|c| c.distance(pick.place) < SAME);
+            Picked { pick, corner }
+        };
+        let picks = picks.into_iter().map(picked).collect();
+        let picture = image(Overlay::plain(&photograph));
+        let (photograph, site) = (Arc::new(photograph), Arc::new(site));
+        Ok(Opened { photo, photograph, site, outline, picture, picks })
+    })
+}
+
+fn image(overlay: Overlay) -> ColorImage {
+    ColorImage::from_rgb(overlay.size.map(|n| n as usize), &overlay.rgb)
+}
+
+pub(super) fn place(
+    photo: &Photographed,
+    photograph: &Photograph,
+    site: &Site,
+    edges: &[[DVec3; 2]],
+    picks: &[Pick],
+) -> Result<Placed, String> {
+    alone(|| {
+        let prior = photographed::prior(photo, photograph);
+        let located = locate(picks, &prior, &|pose| site.admits(pose, picks));
+        let located = located.map_err(|why| why.to_string())?;
+        let overlay = Overlay::new(photograph, &located.pose, edges, &[], site);
+        Ok(Placed { located, picture: image(overlay) })
+    })
+}
+
+pub(super) fn read(
+    scene: &Scene,
+    photo: &Photographed,
+    site: &Site,
+    shot: (&Photograph, &Located),
+    job: &Job,
+) -> Result<Vec<Face>, String> {
+    alone(|| {
+        let (surface, faces) = photographed::faces(scene, photo, site, shot, job)
+            .map_err(|why: PhotoError| why.to_string())?;
+        Ok(faces.iter().map(|face| shown(surface, face, shot.1)).collect())
+    })
+}
+
+fn shown(surface: &Surface, face: &ReadFace, located: &Located) -> Face {
+    let map = &face.map.face;
+    let find = |defect: &Defect| {
+        let on_face = course(defect);
+        let places = surface.places(&face.seen.face, &on_face);
+        let seen = places.iter().flatten();
+        Find {
+            what: what(defect),
+            course: whither(defect),
+            on_map: on_face.iter().map(|at| map.pixel(*at)).collect(),
+            in_photo: seen.filter_map(|[place, _]| located.pose.project(*place)).collect(),
+            at: places.get(places.len() / 2).copied().flatten(),
+        }
+    };
+    Face {
+        name: face.seen.face.name.clone(),
+        picture: reflectance(map),
+        size: map.size.map(|n| n as f32),
+        mm_px: map.mm_px,
+        known: map.known(),
+        narrowest_mm: face.reading.narrowest_mm,
+        finds: face.reading.defects.iter().map(find).collect(),
+    }
+}
+
+/// The course of a crack; around a patch the square of its area. Across and along, m.
+fn course(defect: &Defect) -> Vec<[f64; 2]> {
+    match defect {
+        Defect::Crack(crack) => crack.points.iter().map(|p| [p.across_m, p.along_m]).collect(),
+        Defect::Spall { patch, .. } | Defect::Rust(patch) | Defect::Efflorescence(patch) => {
+            let half = 0.5 * patch.area_m2.max(0.0).sqrt();
+            [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0]]
+                .map(|[x, y]| [patch.across_m + x * half, patch.along_m + y * half])
+                .to_vec()
+        }
+    }
+}
+
+fn what(defect: &Defect) -> String {
+    match defect {
+        Defect::Crack(crack) => {
+            let width = plus_minus(crack.widest_mm, crack.widest_error_mm, "mm");
+            format!("crack {width}, {:.2} m long", crack.length_m)
+        }
+        Defect::Spall { patch, bars_bare } => {
+            let bare = if *bars_bare { ", bars bare" } else { "" };
+            format!("spall {:.0} cm²{bare}", 1e4 * patch.area_m2)
+        }
+        Defect::Rust(patch) => format!("rust {:.0} cm²", 1e4 * patch.area_m2),
+        Defect::Efflorescence(patch) => format!("efflorescence {:.0} cm²", 1e4 * patch.area_m2),
+    }
+}
+
+/// Where along its member, and how it runs.
+fn whither(defect: &Defect) -> String {
+    let [low, high] = defect.reach_m();
+    match defect {
+        Defect::Crack(crack) => {
+            let course = format!("{:?}", crack.course).to_lowercase();
+            format!("{course}, {low:.2} to {high:.2} m along")
+        }
+        _ => format!("{low:.2} to {high:.2} m along"),
+    }
+}
+
+/// A face without the light on it; what is unknown lets the ground through.
+fn reflectance(map: &FaceMap) -> ColorImage {
+    let step = map.size[0].max(map.size[1]).div_ceil(SIDE).max(1);
+    let [width, height] = map.size.map(|n| n.div_ceil(step));
+    let mut bright: Vec<f32> = map.light.iter().flatten().map(|c| c.max_element()).collect();
+    bright.sort_by(f32::total_cmp);
+    let white = bright.get(bright.len() * 95 / 100).copied().unwrap_or(1.0).max(1e-6);
+    let pixel = |i: usize| {
+        let light = map.light[i / width * step * map.size[0] + i % width * step];
+        light.map_or(Color32::TRANSPARENT, |c| {
+            let [r, g, b] = (c / white * 0.75).to_array().map(srgb);
+            Color32::from_rgb(r, g, b)
+        })
+    };
+    ColorImage::new([width, height], (0..width * height).map(pixel).collect())
+}
+
+/// Writes the table of picks of a photograph.
+pub(super) fn save(photo: &Photographed, picks: &[Picked]) -> Result<(), String> {
+    let of_corners = picks.iter().all(|p| p.corner.is_some());
+    let mut table = String::from(if of_corners { "u,v,member,corner\n" } else { "u,v,x,y,z\n" });
+    for Picked { pick, corner } in picks {
+        let [u, v] = pick.pixel;
+        let [x, y, z] = pick.place.to_array();
+        table += &match corner.filter(|_| of_corners) {
+            Some(corner) => format!("{u:.2},{v:.2},{},{}\n", photo.member, corner + 1),
+            None => format!("{u:.2},{v:.2},{x},{y},{z}\n"),
+        };
+    }
+    file::put(&photo.picks, |out| out.write_all(table.as_bytes()))
+        .map_err(|why| format!("{}: {why}", photo.picks.display()))
+}
+
+/// Puts a photograph and its picks beside the scene, as evidence; says what it is called there.
+pub(super) fn attach(
+    scene: &Path,
+    photo: &Photographed,
+    access: &Access,
+    job: &Job,
+) -> Result<String, String> {
+    let project = Project::open(scene, access).map_err(|why| why.to_string())?;
+    let what = Attachment {
+        member: photo.member.clone(),
+        name: None,
+        date: None,
+        along: None,
+        face: None,
+        angle_deg: None,
+        height_m: None,
+        instrument: None,
+        picture: None,
+        what: What::Photograph {
+            files: [photo.file.clone(), photo.picks.clone()],
+            focal_px: photo.focal_px,
+        },
+    };
+    let proposal = project.propose(&what, job).map_err(|why| why.to_string())?;
+    let name = proposal.name.clone();
+    proposal.commit().map_err(|why| why.to_string())?;
+    Ok(name)
+}
+
+/// A photograph that is not attached yet; its picks lie beside it.
+pub(super) fn own(file: PathBuf, member: &str) -> Photographed {
+    Photographed {
+        member: member.to_owned(),
+        name: file.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+        picks: file.with_extension("picks.csv"),
+        file,
+        date: None,
+        focal_px: None,
+        picking_px: Photographed::PICKING_PX,
+        shadow_error_m: 1e-3 * Photographed::SHADOW_ERROR_MM,
+    }
+}
