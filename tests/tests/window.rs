@@ -42,6 +42,10 @@ struct Window {
     harness: Harness<'static>,
 }
 
+/// Frames that are waited at most, each a millisecond or more: only what never comes ends here, on a
+/// busy machine too.
+const PATIENCE: usize = 200_000;
+
 impl Window {
     fn new(add: impl FnOnce(&mut App)) -> Self {
         Self::paced(None, add)
@@ -76,7 +80,7 @@ impl Window {
 
     /// Frames until `done`; loading runs on threads of its own.
     fn until(&mut self, what: &str, mut done: impl FnMut(&mut World) -> bool) {
-        for _ in 0..20_000 {
+        for _ in 0..PATIENCE {
             self.frame();
             if done(self.app.borrow_mut().world_mut()) {
                 return;
@@ -88,7 +92,7 @@ impl Window {
 
     /// Frames until a widget of this name is there.
     fn until_seen(&mut self, label: &str) {
-        for _ in 0..20_000 {
+        for _ in 0..PATIENCE {
             if self.harness.query_by_label(label).is_some() {
                 return;
             }

@@ -39,6 +39,20 @@ pub(super) fn light(
         })
         .collect();
     let shadow = shadows(frame, &lit);
+    let walks = |k: usize| {
+        let shares = || {
+            groups.iter().zip(&fit.strength).flat_map(|(g, a)| g.of.iter().map(move |l| (*l, a)))
+        };
+        [0, 1, 2].map(|c| {
+            let of = |(l, a): (usize, &[f64; 3])| a[c] * a[c] * pictures[l].field.variance[k][c];
+            shares().map(of).sum::<f64>() / lit[k][c].powi(2)
+        })
+    };
+    let around = Around {
+        frame,
+        log: lit.iter().map(|lit| lit.map(|l| (l > 0.0).then(|| l.ln()))).collect(),
+        walks: (0..lit.len()).map(walks).collect(),
+    };
     let at = |k: usize| {
         let unknown = [f64::NAN; 6];
         let Some(shown) = frame.shown[k] else { return unknown };
@@ -47,18 +61,11 @@ pub(super) fn light(
         }
         let radius2 = frame.radius2(frame.middle(k));
         let v = vignetting(fit.bends, radius2);
-        let shift = shifted(frame, &lit, k, located, settings.shadow_error_m);
+        let shift = around.shifted(k, located, settings.shadow_error_m);
         let mut found = unknown;
         for c in 0..3 {
-            let walks: f64 = groups
-                .iter()
-                .zip(&fit.strength)
-                .flat_map(|(group, a)| group.of.iter().map(move |l| (l, a[c])))
-                .map(|(l, a)| a * a * pictures[*l].field.variance[k][c])
-                .sum::<f64>()
-                / lit[k][c].powi(2);
             found[c] = v * lit[k][c];
-            found[3 + c] = walks + fit.variance(&light[k], c, radius2) + shift[c];
+            found[3 + c] = around.walks[k][c] + fit.variance(&light[k], c, radius2) + shift[c];
         }
         let is_sure = found[3..].iter().all(|variance| *variance < VAGUE * VAGUE);
         if is_sure { found } else { unknown }
@@ -90,46 +97,77 @@ fn shadows(frame: &Frame, lit: &[[f64; 3]]) -> impl Fn(&Piece) -> f64 + Sync {
     move |piece| limits.get(piece).copied().unwrap_or(0.0)
 }
 
-/// Variance of log ŷ because it may belong to another place: by its slope where that is a matter of
-/// the pose or lies within a pixel, by the largest step within the stated error of shadows.
-fn shifted(
-    frame: &Frame,
-    lit: &[[f64; 3]],
-    k: usize,
-    located: &Located,
-    shadow_error_m: f64,
-) -> [f64; 3] {
-    let Some(shown) = frame.shown[k] else { return [0.0; 3] };
-    let pixels_m =
-        located.pose.focal_px / located.pose.position.distance(shown.place) / frame.scale;
-    let reach = (shadow_error_m * pixels_m).min(24.0);
+/// What is known of ŷ about a pixel.
+struct Around<'a> {
+    frame: &'a Frame,
+    /// ln ŷ; none where no light falls.
+    log: Vec<[Option<f64>; 3]>,
+    /// Its variance by the walks.
+    walks: Vec<[f64; 3]>,
+}
+
+/// A step is one where it exceeds so many standard errors of the walks' difference: the largest of
+/// a thousand differences is about as large by chance.
+const CHANCE: f64 = 3.0;
+
+impl Around<'_> {
+    /// Steps of ln ŷ from pixel k, with where they lead; into darkness they are 1.
+    fn steps(&self, k: usize, reach: f64) -> impl Iterator<Item = ([f64; 2], [f64; 3])> {
+        let log = |q: usize, c: usize| match (self.log[q][c], self.log[k][c]) {
+            (Some(there), Some(here)) => there - here,
+            _ => 1.0,
+        };
+        let near = self.frame.around(k, (reach.ceil() as usize).max(1));
+        near.map(move |(q, at)| (at, [0, 1, 2].map(|c| log(q, c))))
+    }
+
+    /// Variance of ln ŷ because it may belong to another place. By its slope where that is a matter
+    /// of the pose or lies within a pixel; within the stated error of shadows by the mean square of
+    /// the plane through its steps (shading that is evenly off) and by the largest step that this
+    /// plane leaves (the edge of a shadow).
+    fn shifted(&self, k: usize, located: &Located, shadow_error_m: f64) -> [f64; 3] {
+        let Some(shown) = self.frame.shown[k] else { return [0.0; 3] };
+        let pixels_m =
+            located.pose.focal_px / located.pose.position.distance(shown.place) / self.frame.scale;
+        let reach = (shadow_error_m * pixels_m).min(24.0);
+        let next = plane(self.steps(k, 1.0));
+        // Half a pixel's width, evenly: 1/12. Steps within a fraction of a pixel go as the slope
+        // does.
+        let wide = if reach < 1.0 { reach * reach } else { 0.0 } + 1.0 / 12.0;
+        let cover = [shown.shift[0] + wide, shown.shift[1], shown.shift[2] + wide];
+        let mut shifted =
+            next.map(|[x, y]| x * x * cover[0] + 2.0 * x * y * cover[1] + y * y * cover[2]);
+        if reach >= 1.0 {
+            let within =
+                || self.steps(k, reach).filter(|([i, j], _)| i * i + j * j <= reach * reach);
+            let even = plane(within());
+            let mut step = [0.0_f64; 3];
+            for ([i, j], log) in within() {
+                (0..3).for_each(|c| {
+                    step[c] = step[c].max((log[c] - i * even[c][0] - j * even[c][1]).abs());
+                });
+            }
+            for c in 0..3 {
+                let [x, y] = even[c];
+                let edge = (step[c] - CHANCE * (2.0 * self.walks[k][c]).sqrt()).max(0.0);
+                shifted[c] += 0.25 * reach * reach * (x * x + y * y) + edge * edge;
+            }
+        }
+        shifted
+    }
+}
+
+/// The slope of the plane through the middle that leaves least of the steps.
+fn plane(steps: impl Iterator<Item = ([f64; 2], [f64; 3])>) -> [[f64; 2]; 3] {
     let (mut moment, mut slope) = ([0.0_f64; 3], [[0.0_f64; 2]; 3]);
-    let mut step = [0.0_f64; 3];
-    for (q, [i, j]) in frame.around(k, (reach.ceil() as usize).max(1)) {
-        let log: [f64; 3] =
-            [0, 1, 2].map(|c| if lit[q][c] > 0.0 { (lit[q][c] / lit[k][c]).ln() } else { 1.0 });
-        if i * i + j * j <= reach * reach {
-            (0..3).for_each(|c| step[c] = step[c].max(log[c].abs()));
-        }
-        if i.abs() <= 1.0 && j.abs() <= 1.0 {
-            moment = [moment[0] + i * i, moment[1] + i * j, moment[2] + j * j];
-            (0..3).for_each(|c| slope[c] = [slope[c][0] + i * log[c], slope[c][1] + j * log[c]]);
-        }
+    for ([i, j], log) in steps {
+        moment = [moment[0] + i * i, moment[1] + i * j, moment[2] + j * j];
+        (0..3).for_each(|c| slope[c] = [slope[c][0] + i * log[c], slope[c][1] + j * log[c]]);
     }
     let [xx, xy, yy] = moment;
     let det = xx * yy - xy * xy;
-    // Half a pixel's width, evenly: 1/12.
-    let cover = [shown.shift[0] + 1.0 / 12.0, shown.shift[1], shown.shift[2] + 1.0 / 12.0];
-    [0, 1, 2].map(|c| {
-        let by_slope = if det > 0.0 {
-            let [x, y] = slope[c];
-            let [gx, gy] = [(yy * x - xy * y) / det, (xx * y - xy * x) / det];
-            // Steps within a fraction of a pixel go as the slope does.
-            let wide = if reach < 1.0 { reach * reach } else { 0.0 };
-            gx * gx * (cover[0] + wide) + 2.0 * gx * gy * cover[1] + gy * gy * (cover[2] + wide)
-        } else {
-            0.0
-        };
-        by_slope + if reach >= 1.0 { step[c].powi(2) } else { 0.0 }
+    slope.map(|[x, y]| match det > 0.0 {
+        true => [(yy * x - xy * y) / det, (xx * y - xy * x) / det],
+        false => [0.0; 2],
     })
 }
