@@ -6,6 +6,7 @@
 //! `assets/network` holds the weights and how they came to be.
 
 mod camera;
+mod fill;
 pub mod lesson;
 mod outline;
 mod sample;
@@ -22,7 +23,7 @@ use intrados_raster::{
 };
 use intrados_stage::{Cancelled, Job};
 
-use scales::{SMALLEST, halved};
+use scales::{SCALES, SMALLEST, halved};
 use sight::{CELL, PIXELS, PLANES, Sight};
 
 /// A kind of damage that is seen.
@@ -143,7 +144,7 @@ impl Reader {
         self.marks_by(TILE, light, known, job)
     }
 
-    /// At the picture's own scale and at half of it.
+    /// From all views.
     fn marks_by(
         &self,
         tile: usize,
@@ -151,12 +152,13 @@ impl Reader {
         known: &Mask,
         job: &Job,
     ) -> Result<Marks, Cancelled> {
-        let mut marks = self.at_one_scale(tile, light, known, job)?;
-        let (half, seen) = halved(light, known);
-        if half.width.min(half.height) >= SMALLEST {
-            marks.weigh(&self.at_one_scale(tile, &half, &seen, job)?, known);
+        let mut looks = vec![self.at_one_scale(tile, light, known, job)?];
+        let mut farther = halved(light, known);
+        while looks.len() < SCALES && farther.0.width.min(farther.0.height) >= SMALLEST {
+            looks.push(self.at_one_scale(tile, &farther.0, &farther.1, job)?);
+            farther = halved(&farther.0, &farther.1);
         }
-        Ok(marks)
+        Ok(Marks::together(looks, known))
     }
 
     fn at_one_scale(
