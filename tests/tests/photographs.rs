@@ -127,6 +127,9 @@ fn a_photograph_becomes_evidence() {
     let width = widest.width_mm.unwrap();
     // Its mouth is told as wide as planted at its widest; it swells and shrinks by some tenths.
     assert!((width - WIDTH_MM).abs() < 0.35 * WIDTH_MM, "{widest:?}");
+    let told = member.photographed().unwrap();
+    assert!(told.contains("% of Front (cracks from") && told.contains("% of Right"), "{told}");
+    assert!(told.contains("nothing of Back, Left: what is there is unknown"), "{told}");
     // Two of four faces were seen: elsewhere than at the crack the rest of the error is there.
     let concrete = member.causes[&intrados_damage::Cause::Concrete].0;
     let far = concrete[1].unwrap();

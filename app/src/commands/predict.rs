@@ -188,6 +188,9 @@ fn table(document: &Document) -> String {
     text += &ledger(prediction);
     for m in &prediction.members {
         m.conflicts.iter().for_each(|c| text += &format!("conflict {}, {c}\n", m.name));
+        if let Some(seen) = m.photographed() {
+            text += &format!("faces {}: {seen}\n", m.name);
+        }
         if let Some(check) = m.crack_check.as_ref().filter(|c| c.exceeded) {
             text += &format!(
                 "crack {}: {:.2} mm ({}), limit {} mm in {}\n",

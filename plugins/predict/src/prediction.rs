@@ -13,6 +13,7 @@ use intrados_damage::{
 };
 use intrados_gauges::GaugeReading;
 use intrados_scene::MemberKind;
+use intrados_survey::photographed::FaceSeen;
 use serde::Serialize;
 
 use crate::{Defect, SliceReading};
@@ -106,12 +107,22 @@ pub struct MemberPrediction {
     /// What its gauges read, beside what a sound member would show; also where no damage explains
     /// them and they are no evidence.
     pub gauges: Vec<GaugeReading>,
+    /// How much of its faces photographs show; empty where nobody took one.
+    pub faces: Vec<FaceSeen>,
     /// Evidence by its source.
     pub evidence: BTreeMap<&'static str, Evidence>,
     /// Truth where it is known.
     pub truth: Option<Truth>,
     /// The slices, one by one.
     pub slices: Vec<SliceReading>,
+}
+
+impl MemberPrediction {
+    /// What photographs show of it and what they do not, one sentence; none where nobody took one.
+    #[must_use]
+    pub fn photographed(&self) -> Option<String> {
+        (!self.faces.is_empty()).then(|| FaceSeen::told(&self.faces))
+    }
 }
 
 /// The widest crack of a member against the profile's limit.

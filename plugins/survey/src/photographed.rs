@@ -12,7 +12,7 @@ use intrados_ct::{Picture, picture::CRACK};
 use intrados_damage::zone::{ZONES, zone_at};
 use intrados_photo::{
     Located, Photograph, Pick, Prior, Site,
-    face::{Chart, Surface},
+    face::{Chart, Face, Surface},
     locate,
     map::{FaceMap, MapError},
     picture::srgb,
@@ -25,6 +25,7 @@ use intrados_scene::{
     structure::{Observation, Photographed, Shows, Spot},
 };
 use intrados_stage::{Cancelled, Job};
+use serde::Serialize;
 
 /// The source name of what photographs show, where nobody else looked at the member.
 pub const PHOTOGRAPHED: &str = "photographed";
@@ -109,6 +110,47 @@ pub struct Shown {
     pub observations: Vec<Observation>,
     /// What each looks like.
     pub pictures: Vec<Option<Picture>>,
+    /// How much of each face is seen, also of those that are not.
+    pub faces: Vec<FaceSeen>,
+}
+
+/// How much of a face photographs show.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FaceSeen {
+    /// Front, Right …; Around, Inside.
+    pub face: String,
+    /// Share of which the reflectance is known, 0 to 1; of the rest nothing is said.
+    pub seen: f64,
+    /// The narrowest crack that would have been found, mm.
+    pub narrowest_mm: Option<f64>,
+}
+
+impl FaceSeen {
+    /// What is seen of all faces and what is not, one sentence.
+    ///
+    /// ```
+    /// use intrados_survey::photographed::FaceSeen;
+    ///
+    /// let front = FaceSeen { face: "Front".into(), seen: 0.93, narrowest_mm: Some(0.24) };
+    /// let back = FaceSeen { face: "Back".into(), seen: 0.0, narrowest_mm: None };
+    /// assert_eq!(FaceSeen::told(&[front, back]), "Photographs show 93 % of Front (cracks from 0.24 mm), nothing of Back: what is there is unknown.");
+    /// ```
+    #[must_use]
+    pub fn told(faces: &[Self]) -> String {
+        let is_seen = |f: &&Self| f.seen >= GLIMPSE;
+        let seen = faces.iter().filter(is_seen).map(|f| {
+            let limit =
+                f.narrowest_mm.map_or(String::new(), |mm| format!(" (cracks from {mm:.2} mm)"));
+            format!("{:.0} % of {}{limit}", 100.0 * f.seen, f.face)
+        });
+        let hidden: Vec<&str> =
+            faces.iter().filter(|f| !is_seen(f)).map(|f| f.face.as_str()).collect();
+        let mut told: Vec<String> = seen.collect();
+        if !hidden.is_empty() {
+            told.push(format!("nothing of {}: what is there is unknown", hidden.join(", ")));
+        }
+        format!("Photographs show {}.", told.join(", "))
+    }
 }
 
 impl Shown {
@@ -116,6 +158,14 @@ impl Shown {
     pub fn extend(&mut self, more: Self) {
         self.observations.extend(more.observations);
         self.pictures.extend(more.pictures);
+        // Two photographs of a face may show the same of it: it counts what the better one shows.
+        for face in more.faces {
+            match self.faces.iter_mut().find(|known| known.face == face.face) {
+                Some(known) if known.seen >= face.seen => {}
+                Some(known) => *known = face,
+                None => self.faces.push(face),
+            }
+        }
     }
 }
 
@@ -224,7 +274,19 @@ fn observations(photo: &Photographed, surface: &Surface, faces: &[ReadFace]) -> 
         found.push(observation(format!("{}, zone {}", photo.name, zone + 1), spot, shows));
     }
     pictures.resize(found.len(), None);
-    Shown { observations: found, pictures }
+    let faces = surface.faces.iter().map(|face| seen_of(face, faces)).collect();
+    Shown { observations: found, pictures, faces }
+}
+
+fn seen_of(face: &Face, read: &[ReadFace]) -> FaceSeen {
+    let [width, height] = [face.across, face.along].map(|[from, to]| to - from);
+    let of_it = || read.iter().filter(|r| r.seen.face.name == face.name);
+    let seen: f64 = of_it().flat_map(|r| r.reading.seen_m2).sum();
+    FaceSeen {
+        face: face.name.clone(),
+        seen: (seen / (width * height).max(1e-9)).clamp(0.0, 1.0),
+        narrowest_mm: of_it().filter_map(|r| r.reading.narrowest_mm).reduce(f64::max),
+    }
 }
 
 /// Longest side of a defect's picture, pixels of the face's map.

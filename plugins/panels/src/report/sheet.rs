@@ -126,6 +126,9 @@ fn evidence(ui: &mut Ui, told: &MemberPrediction) {
     for conflict in &told.conflicts {
         ui.label(format!("⚠ contradicting: {conflict}"));
     }
+    if let Some(seen) = told.photographed() {
+        ui.label(seen);
+    }
     if let Some(c) = &told.crack_check {
         let verdict = if c.exceeded { "⚠ wider than" } else { "within" };
         ui.label(format!(

@@ -113,7 +113,7 @@ const CHANCE: f64 = 3.0;
 impl Around<'_> {
     /// Steps of ln ŷ from pixel k, with where they lead; into darkness they are 1.
     fn steps(&self, k: usize, reach: f64) -> impl Iterator<Item = ([f64; 2], [f64; 3])> {
-        let log = |q: usize, c: usize| match (self.log[q][c], self.log[k][c]) {
+        let log = move |q: usize, c: usize| match (self.log[q][c], self.log[k][c]) {
             (Some(there), Some(here)) => there - here,
             _ => 1.0,
         };

@@ -222,6 +222,7 @@ impl Predictor {
             truth: self.truth(member, &self.readings[index]),
             defects: defects(scene, &member.id, photographed, &self.readings[index]),
             gauges: self.measured.get(&index).cloned().unwrap_or_default(),
+            faces: photographed.faces.clone(),
             evidence,
             slices: self.readings[index].clone(),
         }
