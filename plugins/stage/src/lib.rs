@@ -19,3 +19,10 @@ pub use fault::{Fault, catch};
 pub use job::{Cancelled, Job, Jobs, Task, Unfinished, Work, alone, aside};
 pub use pace::Pace;
 pub use stages::{Stage, StagePlugin};
+
+// Not used here. The window and the tests ask these crates of others for more than the rest of the
+// program does; asked for alike everywhere, they and all that rests on them are built once.
+use bytemuck as _;
+use getrandom as _;
+use regex_syntax as _;
+use smallvec as _;
