@@ -38,6 +38,7 @@ pub(crate) fn run(session: &Session, args: &args::Predict) -> Result<Outcome, Fa
         forecast: (!args.no_forecast).then_some(forecast::ForecastSettings {
             ahead_years: args.ahead,
             element_m: args.element,
+            ..forecast::ForecastSettings::default()
         }),
         strict: args.strict,
         ..predicting()

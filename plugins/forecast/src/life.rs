@@ -62,11 +62,13 @@ pub struct ForecastSettings {
     pub ahead_years: f64,
     /// Edge of elements, m; none: some 150 to a member.
     pub element_m: Option<f64>,
+    /// The most work of a life, as [`MarchSettings::work`] counts it; none: all it takes.
+    pub work: Option<f64>,
 }
 
 impl Default for ForecastSettings {
     fn default() -> Self {
-        Self { ahead_years: 20.0, element_m: None }
+        Self { ahead_years: 20.0, element_m: None, work: None }
     }
 }
 
@@ -230,17 +232,17 @@ pub fn forecast(
     prepared.times.push(now + settings.ahead_years * YEAR);
     let mut watch = Watch::new(scene, &prepared, rule, now, job);
     // Solvers would report shares of their own: how far the life is, its times tell.
+    let march =
+        MarchSettings { work: settings.work.unwrap_or(f64::INFINITY), ..MarchSettings::of_life() };
     let (outcome, _) =
-        analyze(&prepared, MarchSettings::of_life(), &job.part(0.0, 0.0), &mut watch).map_err(
-            |e| match e {
-                Failure::Cancelled(_) => ForecastError::Cancelled,
-                other if job.is_cancelled() => {
-                    tracing::debug!("{other}");
-                    ForecastError::Cancelled
-                }
-                other => ForecastError::Because(other.to_string()),
-            },
-        )?;
+        analyze(&prepared, march, &job.part(0.0, 0.0), &mut watch).map_err(|e| match e {
+            Failure::Cancelled(_) => ForecastError::Cancelled,
+            other if job.is_cancelled() => {
+                tracing::debug!("{other}");
+                ForecastError::Cancelled
+            }
+            other => ForecastError::Because(other.to_string()),
+        })?;
     outcome.warnings.iter().for_each(|w| tracing::warn!("{model}: {w}"));
     let gauges = std::mem::take(&mut watch.courses);
     let reached =

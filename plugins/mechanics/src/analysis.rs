@@ -245,6 +245,12 @@ pub fn analyze(
                 );
                 break;
             }
+            Err(why @ Failure::Laborious) => {
+                let history = &march.history;
+                let moved = displacement(prepared, history);
+                outcome.end(prepared, why.to_string(), history.time, moved);
+                break;
+            }
             // What has never been in equilibrium is held or loaded wrongly; what was, has failed.
             Err(why @ (Failure::NotConverged { .. } | Failure::Solve(_)))
                 if !outcome.steps.is_empty() =>

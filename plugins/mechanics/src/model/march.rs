@@ -31,7 +31,13 @@ pub struct MarchSettings {
     /// To which part of what is out of balance they are solved: no closer than an iteration of
     /// Newton's comes anyway (Dembo, Eisenstat and Steihaug 1982).
     pub linear: f64,
+    /// What all steps may take: iterations of linear solvers, an assembly counting
+    /// [`ASSEMBLY`] of them, times unknowns. About 1.5e-6 CPU-seconds each.
+    pub work: f64,
 }
+
+/// What an assembly of the equations counts, in iterations of the linear solver.
+const ASSEMBLY: f64 = 4.0;
 
 impl Default for MarchSettings {
     fn default() -> Self {
@@ -43,6 +49,7 @@ impl Default for MarchSettings {
             cuts: 8,
             method: Method::Auto,
             linear: 1e-8,
+            work: f64::INFINITY,
         }
     }
 }
@@ -193,6 +200,11 @@ pub enum Failure {
     /// An equilibrium of small displacements that the member does not have.
     #[error("{0}")]
     Beyond(String),
+    /// It takes more work than it may.
+    #[error(
+        "its cracks take more work than this life may have (it is one of many): `intrados analyze --member` gives it all it needs"
+    )]
+    Laborious,
     /// Somebody asked the work to stop.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
@@ -213,6 +225,8 @@ struct Way<'s, 'm> {
     system: Equations,
     /// None: cracks are bands.
     nonlocal: Option<Nonlocal>,
+    /// Work so far, as [`MarchSettings::work`] counts it.
+    spent: f64,
 }
 
 /// Stiffness, and what solves with it.
@@ -287,7 +301,14 @@ impl<'s, 'm> March<'s, 'm> {
         };
         Self {
             history,
-            way: Way { structure, settings, drive, system, nonlocal: Nonlocal::new(structure) },
+            way: Way {
+                structure,
+                settings,
+                drive,
+                system,
+                nonlocal: Nonlocal::new(structure),
+                spent: 0.0,
+            },
         }
     }
 
@@ -407,7 +428,7 @@ impl Way<'_, '_> {
     /// One step. The inner error: not to be had in one.
     fn attempt(&mut self, history: &History, goal: &Goal, job: &Job) -> Attempt {
         let &Goal { time, amount, growth, patience } = goal;
-        let Self { structure, settings, drive, system, nonlocal } = self;
+        let Self { structure, settings, drive, system, nonlocal, spent } = self;
         let warmth = structure.warmth([history.time, time]);
         let (trial, mut field) = (
             Trial { time, warmth: &warmth, growth, hold: HOLD, ..Trial::still(history, &warmth) },
@@ -476,6 +497,10 @@ impl Way<'_, '_> {
             match system.correct(structure, drive, &aim, &balance.out, &x, factor, job) {
                 Ok((step, iterations)) => {
                     linear += iterations;
+                    *spent += (iterations as f64 + ASSEMBLY) * structure.unknowns() as f64;
+                    if *spent > settings.work {
+                        return Err(Failure::Laborious);
+                    }
                     // The factor goes along as one more unknown, on the scale of displacements.
                     x.push(factor * aim.unit);
                     let step = if iteration == 0 { step } else { anderson.improve(&x, step) };

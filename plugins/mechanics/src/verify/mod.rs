@@ -195,6 +195,7 @@ const STRICT: MarchSettings = MarchSettings {
     cuts: 4,
     method: crate::sparse::Method::Auto,
     linear: 1e-10,
+    work: f64::INFINITY,
 };
 
 /// Equilibrium under the loads at a time.

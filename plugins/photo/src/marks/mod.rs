@@ -6,7 +6,6 @@
 //! `assets/network` holds the weights and how they came to be.
 
 mod camera;
-mod fill;
 pub mod lesson;
 mod outline;
 mod sample;

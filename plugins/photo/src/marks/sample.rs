@@ -10,7 +10,7 @@ use intrados_stage::{
 };
 
 use super::{
-    MARKS, camera, fill,
+    MARKS, camera,
     lesson::{Lesson, Mouth},
     sight::Sight,
 };
@@ -114,8 +114,6 @@ impl Sample {
         let truth = frame.sampled(&lesson.labels, lesson.side, |sixteen| {
             std::array::from_fn(|m| sixteen.iter().map(|(l, w)| w * l[m]).sum())
         });
-        let open = truth.map(|t| t[0]);
-        let light = if draw.chance(0.5) { fill::softened(&light, &open, &mut draw) } else { light };
         let roots = camera::taken(&light, key.split(1, 0));
         let lines: Vec<Vec<Mouth>> = lesson.courses.iter().map(|c| placed(c, &frame)).collect();
         let mut sample = Self {
@@ -159,22 +157,8 @@ impl Sample {
                 self.counts.data[j] = true;
             });
         }
-        // A wide crack that is filled to its lips is as faint as a narrow one can be.
-        let unseen = course.map(|c| c).data;
-        let unseen = Grid {
-            data: unseen
-                .iter()
-                .zip(&seen.data)
-                .map(|(c, s)| f64::from(u8::from(*c && !*s)))
-                .collect(),
-            ..grey.map(|_| 0.0)
-        };
-        let [clear, faint] =
-            [seen.map(|s| f64::from(u8::from(s))), unseen].map(|grid| boxed(&grid, LIPS));
         for i in wide.pixels() {
-            let is_clear = clear.data[i] >= faint.data[i];
-            self.truth.data[i][0] = f32::from(u8::from(is_clear));
-            self.counts.data[i] = is_clear;
+            self.truth.data[i][0] = 1.0;
         }
     }
 }
@@ -211,8 +195,6 @@ const FAINTEST: f32 = 0.55;
 /// Half sides of the squares over which a line's tone and that of its surroundings are averaged.
 const LINE: usize = 7;
 const AROUND: usize = 14;
-/// Half side of the square in which a wide crack's pixel has its course.
-const LIPS: usize = 24;
 
 /// Where a course is to be seen: its tone, averaged along it, against what is around it.
 fn seen(course: &Grid<bool>, wide: &Grid<bool>, grey: &Grid<f32>) -> Grid<bool> {

@@ -21,7 +21,7 @@ use intrados_damage::{
     ledger,
 };
 use intrados_forecast as forecast;
-use intrados_forecast::{FORECAST, Forecast, ForecastError, forecast};
+use intrados_forecast::{FORECAST, Forecast, ForecastError, ForecastSettings, forecast};
 use intrados_gauges as gauges;
 use intrados_gauges::{GAUGES, GaugeError, GaugeReading, monitoring};
 use intrados_mechanics::frame;
@@ -46,6 +46,15 @@ use crate::{
 };
 
 use together::{Gathered, part_of};
+
+/// What all lives of a scene may take, as [`MarchSettings::work`] counts it: an hour or so on two
+/// cores, if every life takes its share; few do.
+///
+/// [`MarchSettings::work`]: intrados_mechanics::model::MarchSettings::work
+const WORK: f64 = 6e9;
+/// What one life may take at least, about 15 CPU-seconds, and at most, about 40 minutes.
+const LEAST_WORK: f64 = 1e7;
+const MOST_WORK: f64 = 1.5e9;
 
 /// Work that goes on piece by piece.
 #[derive(Debug, Clone)]
@@ -310,6 +319,12 @@ impl Predictor {
         self.fates.resize(self.next, Some(why.to_owned()));
     }
 
+    /// The most work of a life: of many, each has its share of [`WORK`].
+    fn share(&self) -> f64 {
+        let lives = self.queue.iter().filter(|item| matches!(item, Item::Life(_))).count();
+        (WORK / lives.max(1) as f64).clamp(LEAST_WORK, MOST_WORK)
+    }
+
     /// Lives side by side, which know nothing of each other; what they tell is kept in their order.
     fn foretell(
         &mut self,
@@ -318,6 +333,7 @@ impl Predictor {
         job: &Job,
     ) -> Result<(), PredictError> {
         let Some(settings) = self.settings.forecast else { return Ok(()) };
+        let settings = ForecastSettings { work: settings.work.or(Some(self.share())), ..settings };
         let rule = &self.settings.profile.rule;
         // Of several at once the first tells how far they are.
         let part = |k: usize| if k == 0 { job.part(0.0, 1.0) } else { job.part(0.0, 0.0) };
