@@ -445,9 +445,8 @@ impl Builder<'_> {
                         format!("that makes more than {MAX_STIRRUPS} of them: space them wider");
                     return Err(LoadError::bad(place, "TOO_MANY", message));
                 }
-                let (half, is_round) = section(assembly.frame, index, objects, meshes);
-                let frame = assembly.frame;
-                let lines = parametric::lines_within(half, is_round, reinforcement, frame);
+                let surface = surface(index, objects, meshes);
+                let lines = parametric::lines_in(assembly.frame, &surface, reinforcement);
                 assembly.steel.extend(lines);
             }
         }
@@ -624,26 +623,16 @@ fn lay(scene: &mut Scene, steel: Vec<(String, SteelLine)>) {
     }
 }
 
-/// Half the measures of a member's concrete about its axis, towards angle 0 and towards angle 90,
-/// and whether its section is round.
-fn section(frame: Frame, member: usize, objects: &[Object], meshes: &[Arc<Mesh>]) -> (Vec2, bool) {
+/// The surface of a member's concrete, in the world.
+fn surface(member: usize, objects: &[Object], meshes: &[Arc<Mesh>]) -> Vec<parametric::Triangle> {
     let of_it = |o: &&Object| o.member == Some(member) && o.part == Part::Concrete;
-    let points = || {
-        objects.iter().filter(of_it).flat_map(|o| {
-            let mesh = meshes.get(o.mesh);
-            mesh.into_iter().flat_map(|m| &m.positions).map(|p| o.transform.transform_point3(*p))
+    let faces = objects.iter().filter(of_it).flat_map(|o| {
+        meshes.get(o.mesh).into_iter().flat_map(|m| {
+            let corners = (0..m.triangles.len()).map(|i| m.corners(i));
+            corners.map(|c| c.map(|p| o.transform.transform_point3(p)))
         })
-    };
-    let across = |p: Vec3| {
-        let from = p - frame.start;
-        Vec2::new(from.dot(frame.zero), from.dot(frame.ninety()))
-    };
-    let half = points().map(|p| across(p).abs()).fold(Vec2::ZERO, Vec2::max);
-    let reach = points().map(|p| across(p).length()).fold(0.0, f32::max);
-    // Corners of a box lie √2 of its half measure from the axis, those of a round section at it.
-    let is_round =
-        reach < 1.03 * half.min_element() && half.max_element() < 1.03 * half.min_element();
-    (half, is_round)
+    });
+    faces.collect()
 }
 
 /// Puts a model into a scene at a place. Gives its steel with the ids of its members.

@@ -30,6 +30,8 @@ pub(super) struct Built {
     pub(super) model: Model,
     /// One for each member of the model that bears.
     pub(super) found: Vec<Found>,
+    /// The surface of each of these.
+    pub(super) surfaces: Vec<Surface>,
     /// What was taken off all coordinates, m.
     pub(super) offset: DVec3,
     pub(super) notes: Vec<String>,
@@ -118,6 +120,7 @@ pub(super) fn build(source: &Source, model: Model, job: &Job) -> Result<Built, C
             "{open} surfaces are open and could not be closed: they have no volume, and members among them are not computed"
         ));
     }
+    builder.built.surfaces = builder.surfaces.into_iter().map(|(surface, _)| surface).collect();
     Ok(builder.built)
 }
 
