@@ -311,7 +311,10 @@ fn a_footing_has_bars_of_both_ways_all_along() {
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let path = place.path("out").join("scene.ron");
     let member = &members_of(&path)[0];
-    assert!(member["bars"].as_u64() > Some(10) && member["stirrups"].as_u64() > Some(10), "{member}");
+    assert!(
+        member["bars"].as_u64() > Some(10) && member["stirrups"].as_u64() > Some(10),
+        "{member}"
+    );
     let scene = intrados_scene::Scene::load(&path, &intrados_stage::Job::default()).unwrap();
     let assembly = &scene.structure.assemblies[0];
     assert!(assembly.frame.axis.x.abs() > 4.9, "{:?}", assembly.frame);
@@ -319,9 +322,7 @@ fn a_footing_has_bars_of_both_ways_all_along() {
         let ends = [line.line[0], *line.line.last().unwrap()];
         let is_bar = line.part == intrados_scene::Part::Bar;
         assert!(!is_bar || (ends[1] - ends[0]).x.abs() > 4.8, "{line:?}");
-        let inside = |[x, y, _]: [f32; 3]| {
-            (0.03..4.97).contains(&x) && (0.03..0.67).contains(&y)
-        };
+        let inside = |[x, y, _]: [f32; 3]| (0.03..4.97).contains(&x) && (0.03..0.67).contains(&y);
         assert!(line.line.iter().map(|p| p.to_array()).all(inside), "{line:?}");
     }
 }
@@ -344,7 +345,8 @@ fn bars_that_would_lie_outside_are_not_assumed() {
     obj += "f 1 4 3 2\nf 1 6 5 4\nf 7 8 9 10\nf 7 10 11 12\n";
     fs::write(&path, obj).unwrap();
     let out = folder.path().join("out");
-    let done = run(&["import", text(&path), "--out", text(&out), "--unit", "m", "--format", "json"]);
+    let done =
+        run(&["import", text(&path), "--out", text(&out), "--unit", "m", "--format", "json"]);
     let said = String::from_utf8_lossy(&done.stderr).into_owned();
     let told: Value = serde_json::from_slice(&done.stdout).unwrap();
     assert_eq!([&told["members"]["beam"], &told["reinforcement_assumed"]], [1, 0], "{told}");

@@ -210,9 +210,8 @@ impl MemberSummary {
         };
         // Bars that are told by measures, assumed ones too, have no objects.
         let assembly = scene.structure.assembly(&member.id);
-        let lines = |part| {
-            assembly.map_or(0, |a| a.steel.iter().filter(|line| line.part == part).count())
-        };
+        let lines =
+            |part| assembly.map_or(0, |a| a.steel.iter().filter(|line| line.part == part).count());
         let of_part = |part| match parts(part) {
             0 => lines(part),
             drawn => drawn,

@@ -1,7 +1,7 @@
 //! A checked [`SceneFile`] to a [`Scene`].
 
 use std::{
-    collections::{HashMap, HashSet},
+    collections::{BTreeMap, HashMap, HashSet},
     path::{Path, PathBuf},
     sync::Arc,
 };
@@ -398,6 +398,7 @@ impl Builder<'_> {
         lay(&mut self.scene, std::mem::take(&mut self.steel));
         self.furnish(name, &file.details)?;
         suspicious(&mut self.scene);
+        classless(&mut self.scene);
         self.scene.warnings.extend(doubts(file));
         Ok(())
     }
@@ -750,6 +751,32 @@ pub(crate) fn bare_model(
     lay(&mut scene, steel);
     suspicious(&mut scene);
     Ok(scene)
+}
+
+/// What models said of their members' concrete, as it is now that details have spoken.
+fn classless(scene: &mut Scene) {
+    let before = scene.warnings.len();
+    scene.warnings.retain(|w| !w.contains(gltf::NO_CLASS));
+    if scene.warnings.len() == before {
+        return;
+    }
+    let mut assumed: BTreeMap<&str, usize> = BTreeMap::new();
+    let bears = |m: &&crate::Member| !matches!(m.kind, MemberKind::Bar | MemberKind::Tendon);
+    for member in scene.members.iter().filter(bears).filter(|m| m.concrete_assumed) {
+        *assumed.entry(&member.concrete).or_default() += 1;
+    }
+    let count: usize = assumed.values().sum();
+    let classes: Vec<String> = match assumed.len() {
+        0 => return,
+        1 => assumed.keys().map(|class| format!("{class} is assumed")).collect(),
+        _ => assumed.iter().map(|(class, n)| format!("{class} is assumed of {n}")).collect(),
+    };
+    let of = if count == 1 {
+        "one member states no concrete class".to_owned()
+    } else {
+        format!("{count} {}", gltf::NO_CLASS)
+    };
+    scene.warnings.push(format!("{of}: {}", classes.join(", ")));
 }
 
 /// Models in millimetres are the commonest mistake.

@@ -61,10 +61,7 @@ pub(super) fn write(
     put("scene.ron", &text).map_err(failed)?;
     put(evidence::NAME, &evidence(&name, built)).map_err(failed)?;
     // What was written must be a scene like any other.
-    let scene = Scene::load(&place.join("scene.ron"), job).map_err(|error| match error {
-        crate::LoadError::Cancelled => ImportError::Cancelled,
-        error => ImportError::Load(error),
-    })?;
+    let scene = Scene::load(&place.join("scene.ron"), job).map_err(|e| unfit(path, place, e))?;
     let imported = summary(folder, source, built, &members);
     put("README.md", &readme(&name, source, built, &members, &imported, &scene, told))
         .map_err(failed)?;
@@ -77,6 +74,21 @@ pub(super) fn write(
     // It is where it belongs.
     let _ = aside.keep();
     Ok(imported)
+}
+
+/// Why what was made of a model is no scene, without the name of the folder in which it was made.
+fn unfit(path: &Path, aside: &Path, error: crate::LoadError) -> ImportError {
+    if error == crate::LoadError::Cancelled {
+        return ImportError::Cancelled;
+    }
+    let aside = format!("{}/", aside.display());
+    ImportError::bad(
+        path,
+        format!(
+            "what would be written of it is no scene ({}): mend the model there",
+            error.to_string().replace(&aside, "")
+        ),
+    )
 }
 
 #[cfg(unix)]
@@ -127,12 +139,7 @@ impl Bare {
     }
 }
 
-fn detail<'a>(
-    found: &'a Found,
-    surface: &Surface,
-    year: Option<i32>,
-    told: &Told,
-) -> Detail<'a> {
+fn detail<'a>(found: &'a Found, surface: &Surface, year: Option<i32>, told: &Told) -> Detail<'a> {
     let mut assumed = Vec::new();
     let (concrete, strength) = match &found.concrete {
         Some(Concrete::Class(class)) => (class.clone(), None),

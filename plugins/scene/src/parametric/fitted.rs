@@ -40,7 +40,8 @@ pub(crate) fn lines_in(
     if profile.iter().all(same) {
         return lines;
     }
-    let outline = if is_round { Outline::Round(half.min_element()) } else { Outline::Rectangle(half) };
+    let outline =
+        if is_round { Outline::Round(half.min_element()) } else { Outline::Rectangle(half) };
     let fit = Fit { outline, profile, length, reinforcement };
     lines.iter().flat_map(|line| fit.line(frame, line)).collect()
 }
@@ -53,7 +54,11 @@ fn share(k: usize) -> f32 {
 
 fn to_local(frame: Frame, p: Vec3) -> Vec3 {
     let from = p - frame.start;
-    Vec3::new(from.dot(frame.zero), from.dot(frame.ninety()), from.dot(frame.axis.normalize_or_zero()))
+    Vec3::new(
+        from.dot(frame.zero),
+        from.dot(frame.ninety()),
+        from.dot(frame.axis.normalize_or_zero()),
+    )
 }
 
 fn to_world(frame: Frame, p: Vec3) -> Vec3 {
@@ -204,9 +209,8 @@ mod tests {
         const N: usize = 64;
         let ring = |k: usize| {
             let z = 8.0 * k as f32 / N as f32;
-            [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]].map(|[x, y]: [f32; 2]| {
-                Vec3::new(height(z) + 0.5 * depth(z) * x, 0.15 * y, z)
-            })
+            [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]
+                .map(|[x, y]: [f32; 2]| Vec3::new(height(z) + 0.5 * depth(z) * x, 0.15 * y, z))
         };
         let mut all = Vec::new();
         let mut quad = |[a, b, c, d]: [Vec3; 4]| all.extend([[a, b, c], [a, c, d]]);
@@ -235,10 +239,9 @@ mod tests {
         let r = reinforcement();
         let arch = |z: f32| 1.5 - (z - 4.0).powi(2) / 10.0;
         let haunch = |z: f32| 0.8 - 0.1 * z.min(4.0);
-        for (height, depth) in [
-            (&arch as &dyn Fn(f32) -> f32, &(|_| 0.4) as &dyn Fn(f32) -> f32),
-            (&|_| 0.0, &haunch),
-        ] {
+        for (height, depth) in
+            [(&arch as &dyn Fn(f32) -> f32, &(|_| 0.4) as &dyn Fn(f32) -> f32), (&|_| 0.0, &haunch)]
+        {
             let lines = lines_in(frame(), &bent(height, depth), &r);
             assert_eq!(lines.iter().filter(|l| l.part == Part::Bar).count(), 6);
             assert!(lines.iter().filter(|l| l.part == Part::Stirrup).count() > 30);
