@@ -293,10 +293,10 @@ pub(crate) struct PlaceArgs {
     #[arg(long, value_name = "FACE", value_parser = face)]
     pub(crate) face: Option<Face>,
     /// Side, degrees about the axis, instead of a face
-    #[arg(long, value_name = "DEG", allow_negative_numbers = true, conflicts_with = "face")]
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true, conflicts_with = "face", value_parser = single)]
     pub(crate) angle: Option<f32>,
     /// Above the member's lowest point, m
-    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = single)]
     pub(crate) height: Option<f32>,
     /// When, such as 2026-05-03
     #[arg(long, value_name = "DATE", value_parser = |text: &str| text.parse::<Date>())]
@@ -323,7 +323,7 @@ pub(crate) struct FileArgs {
     #[arg(long, value_name = "NAME", requires = "files", conflicts_with = "finding")]
     pub(crate) test: Option<String>,
     /// CT slices: edge of a pixel, mm; what the files tell if absent
-    #[arg(long, value_name = "MM", requires = "files", conflicts_with = "finding")]
+    #[arg(long, value_name = "MM", requires = "files", conflicts_with = "finding", value_parser = single)]
     pub(crate) pixel_mm: Option<f32>,
     /// The file is a photograph that is to be read, and this table says which places of the scene
     /// are where in it (`intrados photo` tries it)
@@ -411,58 +411,58 @@ pub(crate) struct LoadTestArgs {
 #[command(next_help_heading = "A single finding, instead of a file")]
 pub(crate) struct FindingArgs {
     /// Crack of this width, mm
-    #[arg(long, value_name = "MM", group = "finding", requires = "course")]
+    #[arg(long, value_name = "MM", group = "finding", requires = "course", value_parser = number)]
     pub(crate) crack: Option<f64>,
     /// How a crack runs
     #[arg(long, value_enum)]
     pub(crate) course: Option<CourseArg>,
     /// Length of a crack, m
-    #[arg(long, value_name = "M")]
+    #[arg(long, value_name = "M", value_parser = number)]
     pub(crate) length_m: Option<f64>,
     /// Concrete come off over this area, m²
-    #[arg(long, value_name = "M2", group = "finding")]
+    #[arg(long, value_name = "M2", group = "finding", value_parser = number)]
     pub(crate) spall: Option<f64>,
     /// Depth of a spall; of CT slices, below the face
-    #[arg(long, value_name = "MM")]
+    #[arg(long, value_name = "MM", value_parser = number)]
     pub(crate) depth_mm: Option<f64>,
     /// Steel lies bare in a spall
     #[arg(long)]
     pub(crate) bars_bare: bool,
     /// Stains of rust over this area, m²
-    #[arg(long, value_name = "M2", group = "finding")]
+    #[arg(long, value_name = "M2", group = "finding", value_parser = number)]
     pub(crate) rust: Option<f64>,
     /// Lime or salts over this area, m²
-    #[arg(long, value_name = "M2", group = "finding")]
+    #[arg(long, value_name = "M2", group = "finding", value_parser = number)]
     pub(crate) efflorescence: Option<f64>,
     /// Wet over this area, m²
-    #[arg(long, value_name = "M2", group = "finding")]
+    #[arg(long, value_name = "M2", group = "finding", value_parser = number)]
     pub(crate) wet: Option<f64>,
     /// Area that sounds hollow, m² (0: none does)
-    #[arg(long, value_name = "M2", group = "finding", requires = "tapped")]
+    #[arg(long, value_name = "M2", group = "finding", requires = "tapped", value_parser = number)]
     pub(crate) hollow: Option<f64>,
     /// Area that was tapped for it, m²
-    #[arg(long, value_name = "M2")]
+    #[arg(long, value_name = "M2", value_parser = number)]
     pub(crate) tapped: Option<f64>,
     /// It was looked at there, and nothing was found
     #[arg(long, group = "finding")]
     pub(crate) intact: bool,
     /// Cover meter, mm
-    #[arg(long, value_name = "MM", group = "finding")]
+    #[arg(long, value_name = "MM", group = "finding", value_parser = number)]
     pub(crate) cover: Option<f64>,
     /// Half-cell potential, mV, mostly negative
-    #[arg(long, value_name = "MV", group = "finding", allow_negative_numbers = true)]
+    #[arg(long, value_name = "MV", group = "finding", allow_negative_numbers = true, value_parser = number)]
     pub(crate) half_cell: Option<f64>,
     /// What potentials were measured against; copper/copper sulphate if absent
     #[arg(long, value_enum)]
     pub(crate) electrode: Option<ElectrodeArg>,
     /// Rebound number
-    #[arg(long, value_name = "N", group = "finding")]
+    #[arg(long, value_name = "N", group = "finding", value_parser = number)]
     pub(crate) rebound: Option<f64>,
     /// Ultrasonic pulse velocity, m/s
-    #[arg(long, value_name = "M_S", group = "finding")]
+    #[arg(long, value_name = "M_S", group = "finding", value_parser = number)]
     pub(crate) velocity: Option<f64>,
     /// Depth of carbonation, mm
-    #[arg(long, value_name = "MM", group = "finding")]
+    #[arg(long, value_name = "MM", group = "finding", value_parser = number)]
     pub(crate) carbonation: Option<f64>,
     /// Chloride by depth, mm and % of cement, such as 5:1.1,15:0.6,25:0.3
     #[arg(long, value_name = "PROFILE", group = "finding", value_parser = profile)]
@@ -474,13 +474,13 @@ pub(crate) struct FindingArgs {
     #[arg(long, value_name = "MPA", group = "finding", requires_all = ["diameter_mm", "length_mm"])]
     pub(crate) core_strength: Option<f64>,
     /// Diameter of a core, of CT slices too
-    #[arg(long, value_name = "MM")]
+    #[arg(long, value_name = "MM", value_parser = number)]
     pub(crate) diameter_mm: Option<f64>,
     /// Length of a core as tested
-    #[arg(long, value_name = "MM")]
+    #[arg(long, value_name = "MM", value_parser = number)]
     pub(crate) length_mm: Option<f64>,
     /// Standard error in the finding's unit; the instrument's usual one if absent
-    #[arg(long, value_name = "X")]
+    #[arg(long, value_name = "X", value_parser = number)]
     pub(crate) std_error: Option<f64>,
 }
 
@@ -488,10 +488,27 @@ words! { KindArg for Kind: Cover => Kind::Cover, Rebound => Kind::Rebound, Veloc
 words! { CourseArg for Course: Along => Course::Along, Across => Course::Across, Diagonal => Course::Diagonal, Map => Course::Map }
 words! { ElectrodeArg for Electrode: CopperSulphate => Electrode::CopperSulphate, SilverChloride => Electrode::SilverChloride, Calomel => Electrode::Calomel }
 
+/// A number that is one: not NaN, and not without end.
+fn number(text: &str) -> Result<f64, String> {
+    let wrong = || match text.split_once(',') {
+        Some((whole, part)) if text.matches(',').count() == 1 => {
+            format!("not a number: is that a decimal comma? write {whole}.{part}")
+        }
+        _ => "not a number".to_owned(),
+    };
+    text.trim().parse::<f64>().ok().filter(|n| n.is_finite()).ok_or_else(wrong)
+}
+
+/// The same in single precision.
+fn single(text: &str) -> Result<f32, String> {
+    number(text).map(|n| n as f32)
+}
+
 fn along(text: &str) -> Result<Along, String> {
     let (from, to) = text.split_once(',').unwrap_or((text, text));
     match [from, to].map(|end| end.trim().parse::<f32>()) {
-        [Ok(from), Ok(to)] => Ok(Along([from, to])),
+        [Ok(from), Ok(to)] if from.is_finite() && to.is_finite() => Ok(Along([from, to])),
+        [Ok(_), Ok(_)] => Err("not a number".into()),
         _ => {
             Err("write a place on the axis from 0 to 1, or two with a comma, such as 0.3,0.5"
                 .into())
@@ -511,11 +528,12 @@ pub(crate) struct Profile(pub(crate) Vec<[f64; 2]>);
 fn profile(text: &str) -> Result<Profile, String> {
     let pair = |part: &str| {
         let (depth, percent) = part.split_once(':')?;
-        Some([depth.trim().parse().ok()?, percent.trim().parse().ok()?])
+        let number = |text: &str| text.trim().parse().ok().filter(|n: &f64| n.is_finite());
+        Some([number(depth)?, number(percent)?])
     };
     let pairs: Option<Vec<[f64; 2]>> = text.split(',').map(pair).collect();
     pairs.map(Profile).ok_or_else(|| {
-        "write depth in mm and content in % with a colon, pairs with commas, such as 5:1.1,15:0.6".into()
+        "not all of these are numbers: write depth in mm and content in % with a colon, pairs with commas, such as 5:1.1,15:0.6".into()
     })
 }
 

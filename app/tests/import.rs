@@ -295,3 +295,63 @@ fn an_obj_in_millimetres_is_asked_for_its_unit() {
     assert_eq!(told["members"]["column"], 1);
     assert!((told["volume_m3"]["column"].as_f64().unwrap() - 0.64).abs() < 1e-6, "{told}");
 }
+
+fn members_of(scene: &Path) -> Vec<Value> {
+    let info = run(&["info", text(scene), "--format", "json", "--quiet"]);
+    let info: Value = serde_json::from_slice(&info.stdout).unwrap();
+    info["scenes"][0]["members"].as_array().unwrap().clone()
+}
+
+/// A footing lies as its bars do: below, above and across; `info` counts what is assumed.
+#[test]
+fn a_footing_has_bars_of_both_ways_all_along() {
+    let place = Place::new(WHOLE);
+    let python = place.answer(&[("IfcFooting", "base", [0.0; 3], [5.0, 2.1, 0.7])]);
+    let output = place.import(&python);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let path = place.path("out").join("scene.ron");
+    let member = &members_of(&path)[0];
+    assert!(
+        member["bars"].as_u64() > Some(10) && member["stirrups"].as_u64() > Some(10),
+        "{member}"
+    );
+    let scene = intrados_scene::Scene::load(&path, &intrados_stage::Job::default()).unwrap();
+    let assembly = &scene.structure.assemblies[0];
+    assert!(assembly.frame.axis.x.abs() > 4.9, "{:?}", assembly.frame);
+    for line in &assembly.steel {
+        let ends = [line.line[0], *line.line.last().unwrap()];
+        let is_bar = line.part == intrados_scene::Part::Bar;
+        assert!(!is_bar || (ends[1] - ends[0]).x.abs() > 4.8, "{line:?}");
+        let inside = |[x, y, _]: [f32; 3]| (0.03..4.97).contains(&x) && (0.03..0.67).contains(&y);
+        assert!(line.line.iter().map(|p| p.to_array()).all(inside), "{line:?}");
+    }
+}
+
+/// An angle has no room for bars in the corners of its box: none are assumed, and the reason is
+/// said.
+#[test]
+fn bars_that_would_lie_outside_are_not_assumed() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("angle.obj");
+    let profile = [[0.0, 0.0], [1.0, 0.0], [1.0, 0.25], [0.25, 0.25], [0.25, 1.0], [0.0, 1.0]];
+    let mut obj = String::from("o beam 1\n");
+    for z in [0.0, 6.0] {
+        profile.iter().for_each(|[x, y]| obj += &format!("v {x} {y} {z}\n"));
+    }
+    for k in 0..6 {
+        let next = (k + 1) % 6;
+        obj += &format!("f {} {} {} {}\n", k + 1, next + 1, next + 7, k + 7);
+    }
+    obj += "f 1 4 3 2\nf 1 6 5 4\nf 7 8 9 10\nf 7 10 11 12\n";
+    fs::write(&path, obj).unwrap();
+    let out = folder.path().join("out");
+    let done =
+        run(&["import", text(&path), "--out", text(&out), "--unit", "m", "--format", "json"]);
+    let said = String::from_utf8_lossy(&done.stderr).into_owned();
+    let told: Value = serde_json::from_slice(&done.stdout).unwrap();
+    assert_eq!([&told["members"]["beam"], &told["reinforcement_assumed"]], [1, 0], "{told}");
+    for word in ["no bars are assumed for one member", "beam 1", "details of scene.ron"] {
+        assert!(said.contains(word), "{word}: {said}");
+    }
+    assert_eq!(members_of(&out.join("scene.ron"))[0]["bars"], 0);
+}

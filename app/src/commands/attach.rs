@@ -2,9 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use intrados_ct::{Picture, source::SliceSource};
+use intrados_ct::{Picture, Slice, Slices, source::SliceSource};
 use intrados_photo::Photograph;
 use intrados_scene::{
+    Scene,
     attach::{Attachment, Cut, Finding, Listed, Project, Proposal, Raw, What},
     structure::{Course, Electrode},
 };
@@ -29,22 +30,27 @@ struct Report {
     version: &'static str,
     evidence: String,
     member: String,
+    /// What people call it.
+    member_name: String,
     name: String,
     /// What is known now and was not before.
     added: Vec<Listed>,
     files: Vec<String>,
+    /// What the user should know: columns that were not read, and other doubts.
+    notes: Vec<String>,
 }
 
 pub(crate) fn run(session: &Session, args: &args::Attach) -> Result<Outcome, Failure> {
-    let project = Project::open(&args.project, &session.access)?;
-    let what =
-        Attachment { member: known_as(session, &project, &args.member), ..attachment(args)? };
+    let what = attachment(args)?;
+    let project = Project::edit(&args.project, &session.access, &session.job)?;
+    let what = Attachment { member: known_as(session, &project, &args.member)?, ..what };
     let progress = session.watch(format!("attaching to {}", args.project.display()));
     let proposal = project.propose(&what, &session.job)?;
     let mut notes = doubts(&proposal, &what, &args.files)?;
     notes.extend(placed(session, &proposal, &what)?);
     notes.extend(proposal.notes.iter().cloned());
     let (name, added) = (proposal.name.clone(), proposal.added.clone());
+    let member_name = proposal.scene.name_of(&what.member).to_owned();
     let files = proposal.commit()?;
     drop(progress);
     notes.iter().for_each(|note| session.note(note));
@@ -53,9 +59,11 @@ pub(crate) fn run(session: &Session, args: &args::Attach) -> Result<Outcome, Fai
         version: env!("CARGO_PKG_VERSION"),
         evidence: project.evidence().display().to_string(),
         member: what.member,
+        member_name,
         name,
         added,
         files: output::names(&files),
+        notes,
     };
     session.print(&report, || report.table())?;
     Ok(Outcome::Done)
@@ -77,7 +85,75 @@ fn doubts(
         }
         doubts.extend(slice.doubt().map(|doubt| as_given(&doubt, given)));
     }
+    if let What::Slices { files, pixel_mm, cut } = &what.what {
+        let is_label = |file: &&PathBuf| file.to_string_lossy().contains("_mask-");
+        for file in files.iter().filter(|file| !is_label(file)) {
+            if let Some(why) = too_wide(scene, member, file, *pixel_mm, cut) {
+                return Err(Failure::BadInput(why));
+            }
+        }
+    }
     Ok(doubts)
+}
+
+/// How much wider than its core, or than its member from corner to corner, what a picture shows may
+/// be.
+const WIDER: f64 = 1.1;
+
+/// Why what a picture shows is larger than what it was cut out of: its pixels are not so large.
+fn too_wide(
+    scene: &Scene,
+    index: usize,
+    path: &Path,
+    pixel_mm: Option<f32>,
+    cut: &Cut,
+) -> Option<String> {
+    let picture = Slices::open(path, pixel_mm).ok()?.only().ok()?;
+    let [wide, thin] = shown_mm(&picture);
+    let member = scene.members.get(index)?;
+    let size = f64::from((member.bounds[1] - member.bounds[0]).length()) * 1e3;
+    let pixel = picture.pixel_mm;
+    let path = path.display();
+    match cut.diameter_mm.map(f64::from) {
+        // Across, it is as wide as the core; along, as thin.
+        Some(core) if thin > WIDER * core => Some(format!(
+            "{path}: at {pixel} mm a pixel what it shows is {thin:.0} mm across, and the core {core} mm: is the pixel in µm? write {}",
+            pixel / 1000.0
+        )),
+        _ if size > 0.0 && wide > WIDER * size => Some(format!(
+            "{path}: at {pixel} mm a pixel what it shows is {:.1} m wide, and {} {:.1} m from corner to corner: is the pixel in µm? write {}",
+            wide / 1e3,
+            member.name,
+            size / 1e3,
+            pixel / 1000.0
+        )),
+        _ => None,
+    }
+}
+
+/// Sides of the box around what is not air, mm, the longer one first: what is brighter than the
+/// middle between the darkest and the brightest hundredth.
+fn shown_mm(slice: &Slice) -> [f64; 2] {
+    let (width, height) = (slice.grey.width, slice.grey.height);
+    let mut sorted: Vec<f32> = slice.grey.data.iter().copied().filter(|g| g.is_finite()).collect();
+    sorted.sort_unstable_by(f32::total_cmp);
+    let rank = |share: usize| sorted.get((sorted.len().saturating_sub(1)) * share / 100);
+    let [Some(dark), Some(bright)] = [rank(1), rank(99)] else { return [0.0; 2] };
+    let middle = 0.5 * (dark + bright);
+    // A line of which so little is bright is noise.
+    let is_seen = |bright: usize, of: usize| 20 * bright > of;
+    let extent = |lines: usize, of: usize, at: &dyn Fn(usize, usize) -> usize| {
+        let seen = (0..lines).filter(|&line| {
+            let bright = (0..of)
+                .filter(|&k| slice.grey.data.get(at(line, k)).is_some_and(|grey| *grey > middle));
+            is_seen(bright.count(), of)
+        });
+        let ends = seen.fold([usize::MAX, 0], |[a, b], line| [a.min(line), b.max(line)]);
+        (ends[1] + 1).saturating_sub(ends[0]) as f64 * f64::from(slice.pixel_mm)
+    };
+    let across = extent(width, height, &|column, row| row * width + column);
+    let down = extent(height, width, &|row, column| row * width + column);
+    [across.max(down), across.min(down)]
 }
 
 /// Refuses a photograph that cannot be placed; says from where it was taken.
@@ -179,6 +255,12 @@ fn what(args: &args::Attach) -> Result<What, Failure> {
     let kinds: Vec<Option<bool>> = args.files.iter().map(|file| What::is_table(file)).collect();
     if let Some(other) = kinds.iter().position(Option::is_none) {
         let file = args.files[other].display();
+        let ending = args.files[other].extension().unwrap_or_default().to_ascii_lowercase();
+        if ["jpg", "jpeg"].iter().any(|jpeg| ending == *jpeg) {
+            return Err(Failure::BadInput(format!(
+                "{file}: is a photograph: give --pose PICKS.csv to have it read, or name a finding and add it with --picture; CT slices are saved as .png or .tif, without loss"
+            )));
+        }
         return Err(Failure::BadInput(format!(
             "{file}: is neither a table (.csv, .tsv, .txt) nor CT slices (.tif, .png, .mha, .dcm): convert it, or give the --raw size of bare voxels"
         )));
@@ -383,7 +465,7 @@ fn finding(f: &FindingArgs) -> Option<Finding> {
 
 impl Report {
     fn table(&self) -> String {
-        let mut text = format!("{} of {}, in {}\n", self.name, self.member, self.evidence);
+        let mut text = format!("{} of {}, in {}\n", self.name, self.member_name, self.evidence);
         text += &output::table(&rows(&self.added));
         self.files.iter().take(SHOWN).for_each(|file| text += &format!("file {file}\n"));
         if self.files.len() > SHOWN {

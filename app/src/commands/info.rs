@@ -208,6 +208,14 @@ impl MemberSummary {
         let parts = |part| {
             scene.objects.iter().filter(|o| o.member == Some(index) && o.part == part).count()
         };
+        // Bars that are told by measures, assumed ones too, have no objects.
+        let assembly = scene.structure.assembly(&member.id);
+        let lines =
+            |part| assembly.map_or(0, |a| a.steel.iter().filter(|line| line.part == part).count());
+        let of_part = |part| match parts(part) {
+            0 => lines(part),
+            drawn => drawn,
+        };
         let slices = |s: &Slices| match s {
             Slices::Files { images, .. } | Slices::Stack { images, .. } => images.len(),
             Slices::Drawn { count, .. } => *count as usize,
@@ -221,9 +229,9 @@ impl MemberSummary {
             concrete_assumed: member.concrete_assumed,
             volume_m3: member.volume,
             bounds: member.bounds.map(|b| b.to_array()),
-            bars: parts(Part::Bar),
-            stirrups: parts(Part::Stirrup),
-            tendons: parts(Part::Tendon),
+            bars: of_part(Part::Bar),
+            stirrups: of_part(Part::Stirrup),
+            tendons: of_part(Part::Tendon),
             slices: member.slices.iter().map(slices).sum(),
             truth: member.truth.len(),
         })

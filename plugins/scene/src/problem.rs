@@ -72,3 +72,22 @@ impl fmt::Display for Problem {
         }
     }
 }
+
+/// Why something cannot be written, and what to do; without the name of the file that was to be
+/// written aside, which means nothing to anybody.
+pub(crate) fn unwritten(error: &std::io::Error) -> String {
+    use std::io::ErrorKind as K;
+    match error.kind() {
+        K::PermissionDenied | K::ReadOnlyFilesystem => {
+            "may not be written: change its permissions, or use a folder in which you may write"
+                .to_owned()
+        }
+        K::StorageFull | K::QuotaExceeded => "the disk is full: make room on it".to_owned(),
+        _ => match error.raw_os_error() {
+            Some(code) => {
+                format!("cannot be written: {}", std::io::Error::from_raw_os_error(code))
+            }
+            None => format!("cannot be written: {error}"),
+        },
+    }
+}

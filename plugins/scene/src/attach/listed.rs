@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use crate::{
     Drilled, Scene, Slices,
+    file::evidence::Face,
     structure::{Action, Date, Measures, Photographed, Place, Test},
 };
 
@@ -12,6 +13,8 @@ use crate::{
 pub struct Listed {
     /// Id of the member.
     pub member: String,
+    /// What people call it.
+    pub member_name: String,
     /// Name of the observation, the core, the load test or the gauge.
     pub name: String,
     /// What it is: `cover`, `crack`, `ct`, `load test`, `gauge` …
@@ -22,6 +25,8 @@ pub struct Listed {
     pub along: Option<[f32; 2]>,
     /// Side, degrees about the axis.
     pub angle_deg: Option<f32>,
+    /// The face that has this angle, as `attach` takes it.
+    pub face: Option<String>,
     /// Above the member's lowest point, m.
     pub height_m: Option<f32>,
     /// The value with its unit and its standard error.
@@ -40,6 +45,8 @@ pub fn listed(scene: &Scene) -> Vec<Listed> {
         date: o.date,
         along: o.spot.is_placed().then_some(o.spot.along),
         angle_deg: o.spot.angle_deg,
+        face: None,
+        member_name: String::new(),
         height_m: o.spot.height_m,
         value: o.shows.to_string(),
         instrument: o.instrument.clone(),
@@ -52,6 +59,12 @@ pub fn listed(scene: &Scene) -> Vec<Listed> {
         .chain(readings(scene))
         .chain(series(scene))
         .collect();
+    for one in &mut all {
+        one.member_name = scene.name_of(&one.member).to_owned();
+        let member = scene.members.iter().find(|m| m.id == one.member);
+        let face = member.zip(one.angle_deg).and_then(|(m, a)| Face::at(a, m.kind, m.frame));
+        one.face = face.map(|face| face.name().to_lowercase());
+    }
     let place = |id: &str| scene.members.iter().position(|m| m.id == id);
     all.sort_by_cached_key(|one| place(&one.member));
     all
@@ -81,6 +94,8 @@ fn of_slices(member: &str, slices: &Slices) -> Option<Listed> {
         date,
         along: along.map(|at| [at; 2]),
         angle_deg,
+        face: None,
+        member_name: String::new(),
         height_m: None,
         value,
         instrument: None,
@@ -96,6 +111,8 @@ fn of_photograph(photo: &Photographed) -> Listed {
         date: photo.date,
         along: None,
         angle_deg: None,
+        face: None,
+        member_name: String::new(),
         height_m: None,
         value: file.into_owned(),
         instrument: None,
@@ -120,6 +137,8 @@ fn of_test(test: &Test) -> Listed {
         date: None,
         along: stretches.reduce(|[a, b], [from, to]| [a.min(from), b.max(to)]),
         angle_deg: None,
+        face: None,
+        member_name: String::new(),
         height_m: None,
         value: weights.collect::<Vec<_>>().join(" + "),
         instrument: None,
@@ -137,6 +156,8 @@ fn series(scene: &Scene) -> impl Iterator<Item = Listed> {
             date: series.samples.last().map(|s| s.date),
             along: Some([gauge.along; 2]),
             angle_deg: Some(gauge.angle_deg),
+            face: None,
+            member_name: String::new(),
             height_m: None,
             value: format!("{} readings", series.samples.len()),
             instrument: None,
@@ -162,6 +183,8 @@ fn readings(scene: &Scene) -> impl Iterator<Item = Listed> {
             date: None,
             along: Some([gauge.along; 2]),
             angle_deg: Some(gauge.angle_deg),
+            face: None,
+            member_name: String::new(),
             height_m: None,
             value: format!("{} ± {} {unit}{test}", short(reading.value), short(reading.std_error)),
             instrument: None,

@@ -8,6 +8,7 @@
 mod edit;
 mod listed;
 mod load_test;
+mod lock;
 mod raw;
 
 use std::{
@@ -37,6 +38,7 @@ use crate::{
         extension, is_image, listing, matches, nearest, shorten,
     },
     load::PROJECT,
+    problem::unwritten,
     structure::{Action, Date, Electrode, Test},
 };
 
@@ -65,7 +67,8 @@ pub enum AttachError {
 
 impl AttachError {
     fn write(path: &Path, error: &io::Error) -> Self {
-        Self::CannotWrite(format!("{}: cannot be written: {error}", path.display()))
+        let why = unwritten(error);
+        Self::CannotWrite(format!("{}: {why}", path.display()))
     }
 
     fn denied(path: &Path, why: &Denied) -> Self {
@@ -208,6 +211,8 @@ pub struct Project {
     /// The text of its evidence, where there is some.
     text: Option<String>,
     file: EvidenceFile,
+    /// Nobody else edits it meanwhile.
+    _lock: Option<lock::Lock>,
 }
 
 /// An entry as it is written.
@@ -267,11 +272,29 @@ fn ron_of(value: &impl Serialize) -> ron::Result<String> {
 }
 
 impl Project {
-    /// Opens a project: its folder, or the file of its scene. Only its evidence is read.
+    /// Opens a project to look at it: its folder, or the file of its scene. Only its evidence is
+    /// read.
     ///
     /// # Errors
     /// There is no scene, or what lies beside it is no evidence.
     pub fn open(path: &Path, access: &Access) -> Result<Self, AttachError> {
+        let (scene, folder) = Self::places(path)?;
+        Self::read(scene, folder, access, None)
+    }
+
+    /// Opens a project to change its evidence: waits until nobody else does, and nobody else can
+    /// until this is dropped.
+    ///
+    /// # Errors
+    /// As [`Project::open`], or the job was cancelled while it waited.
+    pub fn edit(path: &Path, access: &Access, job: &Job) -> Result<Self, AttachError> {
+        let (scene, folder) = Self::places(path)?;
+        let lock = lock::Lock::take(&folder, job)?;
+        Self::read(scene, folder, access, Some(lock))
+    }
+
+    /// The scene of a project, and its folder.
+    fn places(path: &Path) -> Result<(PathBuf, PathBuf), AttachError> {
         let is_scene = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("ron"));
         let scene = if is_scene { path.to_owned() } else { path.join(PROJECT) };
         if !scene.is_file() {
@@ -282,21 +305,23 @@ impl Project {
             return Err(AttachError::NoInput(line));
         }
         let folder = scene.parent().unwrap_or(Path::new("")).to_path_buf();
+        Ok((scene, folder))
+    }
+
+    fn read(
+        scene: PathBuf,
+        folder: PathBuf,
+        access: &Access,
+        lock: Option<lock::Lock>,
+    ) -> Result<Self, AttachError> {
         let place = folder.join(evidence::NAME);
-        let text = match access::read(&place, crate::file::MAX_BYTES as u64) {
-            Ok(bytes) => Some(String::from_utf8(bytes).map_err(|_| {
-                let why = "is not UTF-8 text: save it as UTF-8";
-                AttachError::BadInput(format!("{}: {why}", place.display()))
-            })?),
-            Err(Denied::System(e)) if e.kind() == io::ErrorKind::NotFound => None,
-            Err(why) => return Err(AttachError::denied(&place, &why)),
-        };
+        let text = text_of(&place)?;
         let file = match &text {
             Some(text) => evidence::parse(&place.display().to_string(), text)
                 .map_err(|p| AttachError::BadInput(p.to_string()))?,
             None => EvidenceFile { schema: evidence::SCHEMA.into(), ..EvidenceFile::default() },
         };
-        Ok(Self { scene, folder, access: access.clone(), text, file })
+        Ok(Self { scene, folder, access: access.clone(), text, file, _lock: lock })
     }
 
     /// The file of evidence.
@@ -321,18 +346,20 @@ impl Project {
     pub fn propose(&self, what: &Attachment, job: &Job) -> Result<Proposal<'_>, AttachError> {
         let before = self.load(job)?;
         if !before.members.iter().any(|m| m.id == what.member) {
-            let ids = before.members.iter().map(|m| m.id.as_str());
-            return Err(AttachError::BadInput(no_member(&what.member, ids)));
+            return Err(AttachError::BadInput(no_member(&what.member, &before.members)));
         }
         let name = what.name.clone().unwrap_or_else(|| self.free_name(&before, what));
         let is_more = matches!(what.what, What::LoadTest { .. })
             && self.test_of(&what.member, &name).is_some();
-        let taken = !is_more && self.is_taken(&before, &what.member, &name);
-        if taken || name.trim().is_empty() {
+        if name.trim().is_empty() {
+            let line = "the name is empty: give one that people can call it by, or leave it out and one is made";
+            return Err(AttachError::BadInput(line.to_owned()));
+        }
+        if !is_more && self.is_taken(&before, &what.member, &name) {
             let line = format!(
                 "\"{}\" is attached to {} already: choose another --name, or detach it first",
                 shorten(&name),
-                what.member
+                before.name_of(&what.member)
             );
             return Err(AttachError::BadInput(line));
         }
@@ -351,8 +378,10 @@ impl Project {
         let known: HashSet<String> = listed(&before).iter().map(|l| format!("{l:?}")).collect();
         let mut added = listed(&scene);
         added.retain(|one| !known.contains(&format!("{one:?}")));
-        let fresh = scene.warnings.iter().filter(|w| !before.warnings.contains(w));
-        let notes = fresh.cloned().collect();
+        let given = As::given(&self.folder, aside.as_ref(), what);
+        let known: HashSet<&String> = before.warnings.iter().collect();
+        let fresh = scene.warnings.iter().filter(|w| !known.contains(w));
+        let notes = fresh.map(|note| given.say(note)).collect();
         Ok(Proposal { project: self, scene, name, added, notes, text, aside, place })
     }
 
@@ -360,31 +389,27 @@ impl Project {
     /// that is not written, and in copies that will not stay, mean nothing to him.
     fn told_of(&self, error: LoadError, aside: Option<&TempDir>, what: &Attachment) -> AttachError {
         let own = format!("{}: ", self.evidence().display());
-        let name = |dir: &TempDir| dir.path().file_name().unwrap_or_default().to_os_string();
-        let copies = aside.map(|dir| format!("{}/", self.folder.join(name(dir)).display()));
-        let given = what.files().first().and_then(|f| f.parent());
-        let given = given.map_or(String::new(), |folder| match folder.display().to_string() {
-            folder if folder.is_empty() => folder,
-            folder => format!("{folder}/"),
-        });
+        let given = As::given(&self.folder, aside, what);
         let plain = |mut p: crate::Problem| {
             if let Some(rest) = p.place.strip_prefix(&own) {
                 let field = rest.split_once(['.', ':']).map_or("", |(_, field)| field.trim());
                 p.place = field.trim_start_matches("shows.").to_owned();
             }
-            if let Some(copies) = &copies {
-                p.place = p.place.replace(copies, &given);
-                p.message = p.message.replace(copies, &given);
-            }
+            p.place = given.say(&p.place);
+            p.message = given.say(&p.message);
             p
         };
-        AttachError::Load(match error {
-            LoadError::NoInput(problem) => LoadError::NoInput(plain(problem)),
+        match error {
+            LoadError::NoInput(problem) => AttachError::Load(LoadError::NoInput(plain(problem))),
             LoadError::BadInput(problems) => {
-                LoadError::BadInput(problems.into_iter().map(plain).collect())
+                let problems: Vec<_> = problems.into_iter().map(plain).collect();
+                AttachError::BadInput(all_in_one(
+                    &problems,
+                    matches!(what.what, What::Table { .. }),
+                ))
             }
-            LoadError::Cancelled => LoadError::Cancelled,
-        })
+            LoadError::Cancelled => AttachError::Load(LoadError::Cancelled),
+        }
     }
 
     /// The text of the evidence with one more entry.
@@ -402,6 +427,16 @@ impl Project {
         let mut right = self.file.clone();
         entry.add_to(&mut right);
         self.sound(edited, &right)
+    }
+
+    /// Refuses to write over what somebody else has written since this was read.
+    fn unchanged(&self) -> Result<(), AttachError> {
+        let place = self.evidence();
+        if text_of(&place)? == self.text {
+            return Ok(());
+        }
+        let why = "has been changed meanwhile: give the command again";
+        Err(AttachError::CannotWrite(format!("{}: {why}", place.display())))
     }
 
     /// An edited text, if it says what it should.
@@ -496,7 +531,7 @@ impl Project {
                 shadow_error_mm: None,
             }),
             What::LoadTest { force_kn } => {
-                let action = load_test::weight(&scene.members[member], *force_kn, what.along)
+                let action = load_test::weight(scene, member, *force_kn, what.along)
                     .map_err(AttachError::BadInput)?;
                 match self.test_of(&what.member, name) {
                     Some(index) => Entry::Weight(index, action),
@@ -612,6 +647,7 @@ impl Project {
         let text = self.sound(edit::remove(text, list, index), &right)?;
         self.spares(name, &text, job)?;
         let copies = self.copies(&files, &right);
+        self.unchanged()?;
         write(&self.evidence(), &text)?;
         // The entry is gone: what is left of its files is no evidence any more.
         let mut removed = Vec::new();
@@ -744,6 +780,63 @@ impl Project {
     }
 }
 
+/// The folder of the copies, and that of the files that they were made of.
+struct As {
+    copies: Option<String>,
+    given: String,
+}
+
+impl As {
+    fn given(folder: &Path, aside: Option<&TempDir>, what: &Attachment) -> Self {
+        let name = |dir: &TempDir| dir.path().file_name().unwrap_or_default().to_os_string();
+        let given = what.files().first().and_then(|f| f.parent());
+        Self {
+            copies: aside.map(|dir| format!("{}/", folder.join(name(dir)).display())),
+            given: given.map_or(String::new(), |folder| match folder.display().to_string() {
+                folder if folder.is_empty() => folder,
+                folder => format!("{folder}/"),
+            }),
+        }
+    }
+
+    /// A text about copies, about the files that were given.
+    fn say(&self, text: &str) -> String {
+        match &self.copies {
+            Some(copies) => text.replace(copies, &self.given),
+            None => text.to_owned(),
+        }
+    }
+}
+
+/// The first of several faults, and how many more there are. Nothing was written that anybody could
+/// look at.
+fn all_in_one(problems: &[crate::Problem], of_rows: bool) -> String {
+    let errors: Vec<_> = problems.iter().filter(|p| p.severity == crate::Severity::Error).collect();
+    let Some((first, rest)) = errors.split_first() else { return String::new() };
+    let same = rest.iter().filter(|p| p.code == first.code).count();
+    let faults = |n: usize| if n == 1 { "fault".to_owned() } else { "faults".to_owned() };
+    let more = match (same, rest.len() - same) {
+        (0, 0) => String::new(),
+        (0, n) => format!(" (and {n} more {})", faults(n)),
+        (1, 0) if of_rows => " (and one more row has the same fault)".to_owned(),
+        (same, 0) if of_rows => format!(" (and {same} more rows have the same fault)"),
+        (same, n) => format!(" (and {same} more of this fault, {n} of others)"),
+    };
+    format!("{first}{more}")
+}
+
+/// The text of a file of evidence, where there is one.
+fn text_of(place: &Path) -> Result<Option<String>, AttachError> {
+    match access::read(place, crate::file::MAX_BYTES as u64) {
+        Ok(bytes) => String::from_utf8(bytes).map(Some).map_err(|_| {
+            let why = "is not UTF-8 text: save it as UTF-8";
+            AttachError::BadInput(format!("{}: {why}", place.display()))
+        }),
+        Err(Denied::System(e)) if e.kind() == io::ErrorKind::NotFound => Ok(None),
+        Err(why) => Err(AttachError::denied(place, &why)),
+    }
+}
+
 /// The folder and the name of what a path names in a folder of its own below `evidence/`.
 fn copy_of(text: &str) -> Option<(&str, &str)> {
     let (folder, name) = text.strip_prefix(COPIES)?.strip_prefix('/')?.split_once('/')?;
@@ -833,6 +926,7 @@ impl Proposal<'_> {
     /// Something cannot be written; then nothing has changed.
     pub fn commit(self) -> Result<Vec<PathBuf>, AttachError> {
         let project = self.project;
+        project.unchanged()?;
         let mut copies = Vec::new();
         let place = project.folder.join(&self.place);
         if let Some(aside) = self.aside {

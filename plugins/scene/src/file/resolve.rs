@@ -1,7 +1,7 @@
 //! A checked [`SceneFile`] to a [`Scene`].
 
 use std::{
-    collections::{HashMap, HashSet},
+    collections::{BTreeMap, HashMap, HashSet},
     path::{Path, PathBuf},
     sync::Arc,
 };
@@ -398,6 +398,7 @@ impl Builder<'_> {
         lay(&mut self.scene, std::mem::take(&mut self.steel));
         self.furnish(name, &file.details)?;
         suspicious(&mut self.scene);
+        classless(&mut self.scene);
         self.scene.warnings.extend(doubts(file));
         Ok(())
     }
@@ -445,9 +446,8 @@ impl Builder<'_> {
                         format!("that makes more than {MAX_STIRRUPS} of them: space them wider");
                     return Err(LoadError::bad(place, "TOO_MANY", message));
                 }
-                let (half, is_round) = section(assembly.frame, index, objects, meshes);
-                let frame = assembly.frame;
-                let lines = parametric::lines_within(half, is_round, reinforcement, frame);
+                let surface = surface(index, objects, meshes);
+                let lines = parametric::lines_in(assembly.frame, &surface, reinforcement);
                 assembly.steel.extend(lines);
             }
         }
@@ -624,26 +624,16 @@ fn lay(scene: &mut Scene, steel: Vec<(String, SteelLine)>) {
     }
 }
 
-/// Half the measures of a member's concrete about its axis, towards angle 0 and towards angle 90,
-/// and whether its section is round.
-fn section(frame: Frame, member: usize, objects: &[Object], meshes: &[Arc<Mesh>]) -> (Vec2, bool) {
+/// The surface of a member's concrete, in the world.
+fn surface(member: usize, objects: &[Object], meshes: &[Arc<Mesh>]) -> Vec<parametric::Triangle> {
     let of_it = |o: &&Object| o.member == Some(member) && o.part == Part::Concrete;
-    let points = || {
-        objects.iter().filter(of_it).flat_map(|o| {
-            let mesh = meshes.get(o.mesh);
-            mesh.into_iter().flat_map(|m| &m.positions).map(|p| o.transform.transform_point3(*p))
+    let faces = objects.iter().filter(of_it).flat_map(|o| {
+        meshes.get(o.mesh).into_iter().flat_map(|m| {
+            let corners = (0..m.triangles.len()).map(|i| m.corners(i));
+            corners.map(|c| c.map(|p| o.transform.transform_point3(p)))
         })
-    };
-    let across = |p: Vec3| {
-        let from = p - frame.start;
-        Vec2::new(from.dot(frame.zero), from.dot(frame.ninety()))
-    };
-    let half = points().map(|p| across(p).abs()).fold(Vec2::ZERO, Vec2::max);
-    let reach = points().map(|p| across(p).length()).fold(0.0, f32::max);
-    // Corners of a box lie √2 of its half measure from the axis, those of a round section at it.
-    let is_round =
-        reach < 1.03 * half.min_element() && half.max_element() < 1.03 * half.min_element();
-    (half, is_round)
+    });
+    faces.collect()
 }
 
 /// Puts a model into a scene at a place. Gives its steel with the ids of its members.
@@ -761,6 +751,32 @@ pub(crate) fn bare_model(
     lay(&mut scene, steel);
     suspicious(&mut scene);
     Ok(scene)
+}
+
+/// What models said of their members' concrete, as it is now that details have spoken.
+fn classless(scene: &mut Scene) {
+    let before = scene.warnings.len();
+    scene.warnings.retain(|w| !w.contains(gltf::NO_CLASS));
+    if scene.warnings.len() == before {
+        return;
+    }
+    let mut assumed: BTreeMap<&str, usize> = BTreeMap::new();
+    let bears = |m: &&crate::Member| !matches!(m.kind, MemberKind::Bar | MemberKind::Tendon);
+    for member in scene.members.iter().filter(bears).filter(|m| m.concrete_assumed) {
+        *assumed.entry(&member.concrete).or_default() += 1;
+    }
+    let count: usize = assumed.values().sum();
+    let classes: Vec<String> = match assumed.len() {
+        0 => return,
+        1 => assumed.keys().map(|class| format!("{class} is assumed")).collect(),
+        _ => assumed.iter().map(|(class, n)| format!("{class} is assumed of {n}")).collect(),
+    };
+    let of = if count == 1 {
+        "one member states no concrete class".to_owned()
+    } else {
+        format!("{count} {}", gltf::NO_CLASS)
+    };
+    scene.warnings.push(format!("{of}: {}", classes.join(", ")));
 }
 
 /// Models in millimetres are the commonest mistake.

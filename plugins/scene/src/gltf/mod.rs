@@ -69,6 +69,9 @@ const MAX_TEXELS: usize = 48 << 20;
 /// Depth of the node tree.
 const MAX_DEPTH: usize = 256;
 
+/// What is noted of members whose concrete nobody states, behind their number.
+pub(crate) const NO_CLASS: &str = "members state no concrete class";
+
 /// A model in memory, in the types of a scene: what a glTF file brings to it, and what
 /// [`write_glb`] writes.
 #[derive(Debug, Clone, Default, PartialEq)]

@@ -1,9 +1,11 @@
 //! What nobody has stated, by rules that the project's README repeats. None of them replaces a
 //! drawing.
 
+use super::source::{Course, Surface};
 use crate::{
-    MemberKind,
+    Frame, MemberKind, Part,
     file::Assumed,
+    parametric,
     structure::{ASSUMED_CONCRETE, Bars, Grade, Reinforcement, Stirrups},
 };
 
@@ -187,6 +189,34 @@ fn hoops(per_metre: f64, most: f64) -> (f32, f32) {
     let spacing = (area(diameter) / per_metre).min(most);
     // Down to whole centimetres, as they are drawn.
     (diameter as f32, ((100.0 * spacing).floor() * 10.0).max(20.0) as f32)
+}
+
+/// The least share of the length of its bars and stirrups that must lie in a member.
+const INSIDE: f64 = 0.7;
+/// Lines and points of each that are looked at.
+const LINES: usize = 60;
+const POINTS: usize = 9;
+
+/// Whether a cage about a member's axis lies in its concrete: that of a ring's segment, whose
+/// section is bent, does not.
+pub(super) fn fits(reinforcement: &Reinforcement, frame: Frame, surface: &Surface) -> bool {
+    let triangles: Vec<parametric::Triangle> =
+        surface.faces().map(|t| t.map(|p| p.as_vec3())).collect();
+    let lines = parametric::lines_in(frame, &triangles, reinforcement);
+    if !lines.iter().any(|line| line.part == Part::Bar) {
+        return false;
+    }
+    let [mut all, mut within] = [0.0; 2];
+    for line in lines.iter().step_by(lines.len().div_ceil(LINES).max(1)) {
+        let line = line.line.iter().map(|p| p.as_dvec3()).collect();
+        let course = Course { diameter: 0.0, line };
+        let samples = course.samples(POINTS);
+        let share = samples.iter().filter(|p| surface.holds(**p)).count() as f64
+            / samples.len().max(1) as f64;
+        all += course.length();
+        within += course.length() * share;
+    }
+    within >= INSIDE * all
 }
 
 /// What of a member was assumed, in the words of a scene.

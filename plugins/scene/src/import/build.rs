@@ -30,6 +30,8 @@ pub(super) struct Built {
     pub(super) model: Model,
     /// One for each member of the model that bears.
     pub(super) found: Vec<Found>,
+    /// The surface of each of these.
+    pub(super) surfaces: Vec<Surface>,
     /// What was taken off all coordinates, m.
     pub(super) offset: DVec3,
     pub(super) notes: Vec<String>,
@@ -68,6 +70,8 @@ pub(super) struct Found {
     pub(super) tube: Option<Tube>,
     /// Lines of steel in it.
     pub(super) steel: usize,
+    /// Those of them that are no links.
+    pub(super) bars: usize,
 }
 
 /// Coordinates beyond this are taken back to the origin, m: a georeferenced model in single
@@ -83,6 +87,7 @@ pub(super) fn build(source: &Source, model: Model, job: &Job) -> Result<Built, C
         numbers: HashMap::new(),
         colours: HashMap::new(),
         surfaces: Vec::new(),
+        renamed: Vec::new(),
     };
     builder.clear();
     let mut steel = Vec::new();
@@ -118,6 +123,8 @@ pub(super) fn build(source: &Source, model: Model, job: &Job) -> Result<Built, C
             "{open} surfaces are open and could not be closed: they have no volume, and members among them are not computed"
         ));
     }
+    builder.tell();
+    builder.built.surfaces = builder.surfaces.into_iter().map(|(surface, _)| surface).collect();
     Ok(builder.built)
 }
 
@@ -139,9 +146,28 @@ struct Builder {
     colours: HashMap<String, usize>,
     /// Surfaces of members with their boxes, in their order.
     surfaces: Vec<(Surface, [DVec3; 2])>,
+    /// GlobalIds that another element has, too.
+    renamed: Vec<String>,
 }
 
 impl Builder {
+    /// What was changed or is missing, for people.
+    fn tell(&mut self) {
+        if let [first, ..] = &self.renamed[..] {
+            self.built.notes.push(format!(
+                "{} members have a GlobalId that another has before them (such as {first}): they are called by it with a number, \"{first} #2\"; IFC wants each only once",
+                self.renamed.len()
+            ));
+        }
+        for found in self.built.found.iter().filter(|f| f.steel > 0 && f.bars == 0) {
+            let links = found.steel;
+            self.built.notes.push(format!(
+                "no bars along \"{}\": the model has {links} links of it alone; give bars in reinforcement in details of scene.ron",
+                found.name
+            ));
+        }
+    }
+
     /// Members are entered anew; objects of a model that was read stay where they are.
     fn clear(&mut self) {
         let model = &mut self.built.model;
@@ -189,8 +215,11 @@ impl Builder {
             (Some(tube), None) if is_lining => round_frame(tube),
             _ => solid.frame(kind),
         };
-        let id = if element.id.is_empty() { "member" } else { &element.id };
-        let id = self.distinct(id, true);
+        let own = if element.id.is_empty() { "member" } else { &element.id };
+        let id = self.distinct(own, true);
+        if id != own && element.class.starts_with("Ifc") {
+            self.renamed.push(own.to_owned());
+        }
         let name = self.distinct(&full_name(element), false);
         let bounds = element.surface.bounds();
         let volume = element.surface.volume();
@@ -237,6 +266,7 @@ impl Builder {
             volume,
             tube: tube.filter(|_| kind == MemberKind::Lining),
             steel: 0,
+            bars: 0,
         });
         self.surfaces.push((element.surface.clone(), bounds));
     }
@@ -346,6 +376,7 @@ impl Builder {
             self.built.steel.laid += 1;
             if let Some(found) = host.and_then(|h| self.built.found.get_mut(h)) {
                 found.steel += 1;
+                found.bars += usize::from(part != Part::Stirrup);
             }
         }
     }

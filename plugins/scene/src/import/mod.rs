@@ -33,7 +33,7 @@ use std::{
 use intrados_stage::{Access, Cancelled, Job, access::Denied};
 use serde::Serialize;
 
-use crate::{LoadError, MemberKind, Scene};
+use crate::{LoadError, MemberKind, Scene, problem::unwritten};
 
 /// What a user may say of a model beside its file.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -114,7 +114,7 @@ impl ImportError {
     /// A file or folder that cannot be written.
     #[must_use]
     pub fn write(path: &Path, error: &io::Error) -> Self {
-        Self::CannotWrite(format!("{}: cannot be written: {error}", path.display()))
+        Self::CannotWrite(format!("{}: {}", path.display(), unwritten(error)))
     }
 }
 
@@ -143,6 +143,9 @@ impl From<Cancelled> for ImportError {
 /// Sizes outside are doubted, m.
 const SIZES: std::ops::RangeInclusive<f64> = 1e-3..=2e3;
 
+/// No member is longer than this, m.
+const LONGEST: f32 = 2e3;
+
 /// Imports a model into `folder`, which must be empty or not there yet.
 ///
 /// # Errors
@@ -158,6 +161,10 @@ pub fn import(
     let extension =
         path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
     let metres = told.metres.unwrap_or(1.0);
+    if extension == "ifc" && told.metres.is_some() {
+        let what = "IFC says in which unit it is: leave --unit out, and export the model again where its unit is wrong or missing";
+        return Err(ImportError::bad(path, what));
+    }
     let (source, model) = match extension.as_str() {
         "ifc" => (convert::ifc(path, &job.part(0.0, 0.8))?, crate::gltf::Model::default()),
         "glb" | "gltf" => model::gltf(path, metres, access, job)?,
@@ -202,6 +209,19 @@ fn measure(
 ) -> Result<(), ImportError> {
     if built.model.objects.is_empty() {
         return Err(ImportError::bad(path, "has no surfaces: export the model with its geometry"));
+    }
+    if let Some(long) = built.found.iter().find(|f| f.frame.axis.length() > LONGEST) {
+        let remedy = match (has_units, told.metres) {
+            (true, _) => "export it again in the right one",
+            (false, Some(_)) => "say another one with --unit",
+            (false, None) => "say it, --unit mm",
+        };
+        let name = crate::file::shorten(&long.name);
+        let length = long.frame.axis.length();
+        return Err(ImportError::bad(
+            path,
+            format!("\"{name}\" is {:.1} km long; is the unit wrong? {remedy}", 1e-3 * length),
+        ));
     }
     let scene = Scene {
         meshes: built.model.meshes.clone(),

@@ -55,7 +55,11 @@ pub(super) fn gltf(
     let source = Source {
         format: "glTF".into(),
         project: path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default(),
-        notes: std::mem::take(&mut model.warnings),
+        // Which classes are assumed, the scene says that is made of it.
+        notes: std::mem::take(&mut model.warnings)
+            .into_iter()
+            .filter(|note| !note.contains(gltf::NO_CLASS))
+            .collect(),
         elements,
         metres_per_unit: metres,
         ..Source::default()

@@ -17,7 +17,7 @@ use super::{
     build::{Built, Found},
     grade::Concrete,
     ground::{Standing, on_ground},
-    source::Source,
+    source::{Source, Surface},
 };
 use crate::{
     Camera, MemberKind, Scene,
@@ -39,7 +39,9 @@ pub(super) fn write(
     job: &Job,
 ) -> Result<Imported, ImportError> {
     let year = told.year.or(source.year);
-    let members: Vec<Detail> = built.found.iter().map(|f| detail(f, year, told)).collect();
+    let members: Vec<Detail> = (built.found.iter().zip(&built.surfaces))
+        .map(|(found, surface)| detail(found, surface, year, told))
+        .collect();
     let failed = |e: std::io::Error| ImportError::write(folder, &e);
     let parent = match folder.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
@@ -59,10 +61,7 @@ pub(super) fn write(
     put("scene.ron", &text).map_err(failed)?;
     put(evidence::NAME, &evidence(&name, built)).map_err(failed)?;
     // What was written must be a scene like any other.
-    let scene = Scene::load(&place.join("scene.ron"), job).map_err(|error| match error {
-        crate::LoadError::Cancelled => ImportError::Cancelled,
-        error => ImportError::Load(error),
-    })?;
+    let scene = Scene::load(&place.join("scene.ron"), job).map_err(|e| unfit(path, place, e))?;
     let imported = summary(folder, source, built, &members);
     put("README.md", &readme(&name, source, built, &members, &imported, &scene, told))
         .map_err(failed)?;
@@ -75,6 +74,21 @@ pub(super) fn write(
     // It is where it belongs.
     let _ = aside.keep();
     Ok(imported)
+}
+
+/// Why what was made of a model is no scene, without the name of the folder in which it was made.
+fn unfit(path: &Path, aside: &Path, error: crate::LoadError) -> ImportError {
+    if error == crate::LoadError::Cancelled {
+        return ImportError::Cancelled;
+    }
+    let aside = format!("{}/", aside.display());
+    ImportError::bad(
+        path,
+        format!(
+            "what would be written of it is no scene ({}): mend the model there",
+            error.to_string().replace(&aside, "")
+        ),
+    )
 }
 
 #[cfg(unix)]
@@ -97,10 +111,35 @@ struct Detail<'a> {
     exposure: String,
     years: f32,
     reinforcement: Option<Reinforcement>,
+    /// Why it has none.
+    bare: Option<Bare>,
     assumed: Vec<Assumed>,
 }
 
-fn detail<'a>(found: &'a Found, year: Option<i32>, told: &Told) -> Detail<'a> {
+/// Why no bars were assumed for a member of concrete of which none are known.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Bare {
+    /// Its surface is open.
+    Open,
+    /// It is too thin.
+    Thin,
+    /// They would lie outside of it.
+    Outside,
+}
+
+impl Bare {
+    fn why(self) -> &'static str {
+        match self {
+            Self::Open => "its surface is open, so that nobody knows what lies in it",
+            Self::Thin => "there is no room for bars with their cover",
+            Self::Outside => {
+                "the section is bent or broken, and bars along the axis would lie outside of it"
+            }
+        }
+    }
+}
+
+fn detail<'a>(found: &'a Found, surface: &Surface, year: Option<i32>, told: &Told) -> Detail<'a> {
     let mut assumed = Vec::new();
     let (concrete, strength) = match &found.concrete {
         Some(Concrete::Class(class)) => (class.clone(), None),
@@ -121,14 +160,21 @@ fn detail<'a>(found: &'a Found, year: Option<i32>, told: &Told) -> Detail<'a> {
         assumed.push(Assumed::Age);
     }
     let fck = strength.or(concrete_class(&concrete)).unwrap_or(30.0);
-    let bare = found.steel == 0 && found.other.is_none() && found.volume > 0.0;
+    let unknown = found.steel == 0 && found.other.is_none();
     let cover_mm = found.cover_mm.unwrap_or_else(|| assume::cover_mm(&exposure));
-    let reinforcement = if bare && found.tube.is_none() {
-        assume::reinforcement(&measures(found), f64::from(fck), cover_mm)
-    } else {
-        None
-    };
-    if reinforcement.is_some() || (bare && found.tube.is_some()) {
+    let (mut reinforcement, mut bare) = (None, None);
+    if unknown && found.tube.is_none() {
+        let least = assume::reinforcement(&measures(found), f64::from(fck), cover_mm);
+        match least {
+            _ if found.volume <= 0.0 => bare = Some(Bare::Open),
+            None => bare = Some(Bare::Thin),
+            Some(least) if !assume::fits(&least, found.frame, surface) => {
+                bare = Some(Bare::Outside);
+            }
+            least => reinforcement = least,
+        }
+    }
+    if reinforcement.is_some() || (unknown && found.tube.is_some() && found.volume > 0.0) {
         assumed.push(Assumed::Reinforcement);
     }
     Detail {
@@ -138,6 +184,7 @@ fn detail<'a>(found: &'a Found, year: Option<i32>, told: &Told) -> Detail<'a> {
         exposure,
         years: years.unwrap_or(YEARS),
         reinforcement,
+        bare,
         assumed,
     }
 }
@@ -510,6 +557,7 @@ fn summary(folder: &Path, source: &Source, built: &Built, members: &[Detail]) ->
             matter.name, matter.modulus_gpa, matter.density_kg_m3
         ));
     }
+    notes.extend(bare(members));
     if built.steel.loose > 0 {
         notes.push(format!(
             "{} bars and tendons lie in no member and are shown alone",
@@ -532,6 +580,32 @@ fn summary(folder: &Path, source: &Source, built: &Built, members: &[Detail]) ->
         offset_m: built.offset.to_array(),
         notes,
     }
+}
+
+/// Which members have no bars, and why.
+fn bare(members: &[Detail]) -> Vec<String> {
+    let mut of: BTreeMap<Bare, Vec<&str>> = BTreeMap::new();
+    for member in members {
+        if let Some(why) = member.bare {
+            of.entry(why).or_default().push(&member.found.name);
+        }
+    }
+    let said = |(why, names): (Bare, Vec<&str>)| {
+        let named = names.iter().take(3).map(|n| format!("\"{n}\"")).collect::<Vec<_>>().join(", ");
+        let more = match names.len() {
+            0..=3 => String::new(),
+            n => format!(" and {} more", n - 3),
+        };
+        let count = match names.len() {
+            1 => "one member".to_owned(),
+            n => format!("{n} members"),
+        };
+        format!(
+            "no bars are assumed for {count}, since {} ({named}{more}): give reinforcement in details of scene.ron",
+            why.why()
+        )
+    };
+    of.into_iter().map(said).collect()
 }
 
 fn readme(
@@ -600,7 +674,7 @@ fn rules(
 - **Concrete** of {} of {all} members ({known}): C12/15 before 1950, C20/25 before 1972, C25/30 before 2001, C30/37 since and where no year is known. This is a rule of Intrados, of no code.\n\
 - **Exposure** of {}: XC4 (wet and dry in turn), XC2 for footings and piles (EN 206, table 1). Salt is not assumed: give `--exposure \"XC4, XD3\"` where it comes.\n\
 - **Age** of {}: {YEARS} years.\n\
-- **Reinforcement** of {}: the least that EN 1992-1-1 allows, {STEEL}: beams §9.2.1.1 and §9.2.2, slabs and footings §9.3.1.1, columns §9.5.2 and §9.5.3, walls and linings §9.6, piles §9.8.5; cover of table 4.4N (structural class S4) and Δc_dev = 10 mm. Real members have more: their bars are what to look for first.\n\
+- **Reinforcement** of {}: the least that EN 1992-1-1 allows, {STEEL}: beams §9.2.1.1 and §9.2.2, slabs and footings §9.3.1.1, columns §9.5.2 and §9.5.3, walls and linings §9.6, piles §9.8.5; cover of table 4.4N (structural class S4) and Δc_dev = 10 mm. Bars and links follow the surface along the axis of their member; where they would not lie in it, none are assumed, and Remarks say so. Real members have more: their bars are what to look for first.\n\
 - **Steel grade** of {} bars: {STEEL}.\n\
 - **Supports**: the ground holds footings (springs of 50 MPa/m), tunnels (springs of 40 MPa/m), columns and walls that nothing reaches up to, and the lowest slabs. Every other member is held for itself, `alone`, what stands at its foot, what lies under both ends; the whole (`analyze --whole`) leaves those supports out. **Loads**: {}.\n",
         imported.concrete_assumed,

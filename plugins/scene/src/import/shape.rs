@@ -76,7 +76,7 @@ pub(super) fn boxed(surface: &Surface) -> Option<Box3> {
 impl Box3 {
     /// The frame of a member of this kind in the box: upright members have their axis up and their
     /// zero nearest to +z; all others lie along their longest measure that is not the most upright,
-    /// with their zero up.
+    /// with their zero up. A pile stands; a footing that is wider than high lies, as its bars do.
     pub(super) fn frame(&self, kind: MemberKind) -> Frame {
         let upright = |i: &usize| self.unit[*i].y.abs();
         let up = (0..3).max_by(|a, b| upright(a).total_cmp(&upright(b))).unwrap_or(1);
@@ -84,8 +84,11 @@ impl Box3 {
             if self.unit[i].dot(way) < 0.0 { -self.unit[i] } else { self.unit[i] }
         };
         let [p, q] = [(up + 1) % 3, (up + 2) % 3];
+        let lies = self.size[up] < self.size[p].max(self.size[q]);
         let (along, axis, zero) = match kind {
-            MemberKind::Column | MemberKind::Wall | MemberKind::Footing => {
+            MemberKind::Column | MemberKind::Wall | MemberKind::Footing
+                if !(kind == MemberKind::Footing && lies) =>
+            {
                 let front = if self.unit[p].z.abs() > self.unit[q].z.abs() { p } else { q };
                 (up, towards(up, DVec3::Y), towards(front, DVec3::Z))
             }
@@ -201,6 +204,18 @@ mod tests {
         );
         let frame = found.frame(MemberKind::Beam);
         assert!((frame.axis.length() - 8.0).abs() < 1e-4 && frame.zero.y > 0.9, "{frame:?}");
+    }
+
+    #[test]
+    fn a_footing_lies_and_a_pile_stands() {
+        let frame = |size: [f64; 3]| {
+            let unit = [DVec3::X, DVec3::Y, DVec3::Z];
+            Box3 { centre: DVec3::ZERO, unit, size }.frame(MemberKind::Footing)
+        };
+        let footing = frame([2.1, 0.7, 5.0]);
+        assert!(footing.axis.z.abs() > 4.9 && footing.zero.y > 0.9, "{footing:?}");
+        let pile = frame([0.6, 9.0, 0.6]);
+        assert!(pile.axis.y > 8.9, "{pile:?}");
     }
 
     #[test]

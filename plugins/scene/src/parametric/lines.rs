@@ -43,7 +43,7 @@ pub(crate) fn lines_of(body: &Body, frame: Frame) -> Vec<SteelLine> {
 
 /// Bars and stirrups in a box, or a round section, about an axis. `half`: half its measures
 /// towards angle 0 and towards angle 90, m.
-pub(crate) fn lines_within(
+pub(super) fn lines_within(
     half: Vec2,
     is_round: bool,
     reinforcement: &Reinforcement,

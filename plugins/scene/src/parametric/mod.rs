@@ -5,6 +5,7 @@
 //! the axis) and placed by a transform, so that stirrups, hoops and segments of one shape share a
 //! mesh.
 
+mod fitted;
 mod lines;
 pub(crate) mod solid;
 mod steel;
@@ -28,7 +29,8 @@ use crate::{
 };
 use steel::Outline;
 
-pub(crate) use lines::{lines_of, lines_within, steel_lines};
+pub(crate) use fitted::{Triangle, lines_in};
+pub(crate) use lines::{lines_of, steel_lines};
 pub(crate) use surface::surface_meter;
 
 /// A scene file to start from, with comments: `column`, `beam` or `tunnel`.

@@ -96,6 +96,13 @@ impl Face {
         Self::ALL.into_iter().find(|face| face.name().eq_ignore_ascii_case(name))
     }
 
+    /// The face of a member that has this angle about its axis, within half a degree.
+    pub(crate) fn at(angle_deg: f32, kind: MemberKind, frame: Frame) -> Option<Self> {
+        let off = |own: f32| (own - angle_deg + 180.0).rem_euclid(360.0) - 180.0;
+        let is_there = |face: &Self| face.angle_deg(kind, frame).is_ok_and(|a| off(a).abs() < 0.5);
+        Sort::of(kind, frame).faces().into_iter().find(is_there)
+    }
+
     /// Its angle about the axis of a member, degrees, 0 to 360.
     ///
     /// # Errors

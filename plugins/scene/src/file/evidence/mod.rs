@@ -397,6 +397,8 @@ pub(crate) struct Evidence {
     pub(crate) readings: Vec<Placed<RawReading>>,
     /// Photographs and their picks that it names, and where they are.
     pub(crate) pictures: HashMap<String, PathBuf>,
+    /// What of its tables was passed over.
+    pub(crate) notes: Vec<String>,
 }
 
 /// A file of evidence in which nothing is said yet: of what (`name`), with examples for the member
@@ -509,14 +511,14 @@ impl Evidence {
             what: record.clone(),
         };
         let records = file.items.iter().enumerate().map(item).collect();
-        let (readings, pictures) = (Vec::new(), HashMap::new());
-        let mut evidence = Self { records, readings, pictures, name, folder, file };
+        let mut evidence = Self { records, name, folder, file, ..Self::default() };
         for (i, survey) in evidence.file.tables.iter().enumerate().filter(|_| sound) {
             let place = format!("{}: tables[{i}].file", evidence.name);
             let (name, bytes) =
                 open(&evidence.folder, &survey.file).map_err(|e| e.under(&place))?;
             match read_table(&name, &bytes, survey) {
                 Ok(rows) => {
+                    evidence.notes.extend(rows.note);
                     evidence.records.extend(rows.records);
                     evidence.readings.extend(rows.readings);
                     if evidence.records.len() + evidence.readings.len() > MAX_ROWS {

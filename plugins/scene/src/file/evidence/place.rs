@@ -6,14 +6,16 @@ use std::{
 };
 
 use super::{
-    Along, Evidence, Face, Finding, Photo, Placed, RawReading, Record, face::UPRIGHT, table::Seat,
+    Along, Evidence, Face, Finding, Photo, Placed, RawReading, Record,
+    face::UPRIGHT,
+    table::{MOST_STRAIN, Seat},
 };
 use crate::{
     Member, Scene,
     file::{nearest, shorten},
     problem::Problem,
     structure::{
-        Gauge, Measures, Observation, Photographed, Reading, Sample, Series, Shows, Spot,
+        Date, Gauge, Measures, Observation, Photographed, Reading, Sample, Series, Shows, Spot,
         Structure, usual,
     },
 };
@@ -48,6 +50,7 @@ pub(crate) fn place(scene: &mut Scene, evidence: &Evidence) -> Result<(), Vec<Pr
     if !problems.is_empty() {
         return Err(problems);
     }
+    scene.warnings.extend(evidence.notes.iter().cloned());
     scene.warnings.extend(warnings);
     let structure = Arc::make_mut(&mut scene.structure);
     structure.tests.extend(evidence.file.tests.iter().cloned());
@@ -83,8 +86,13 @@ struct Placing<'a> {
     gauges: Vec<Gauge>,
     readings: Vec<Reading>,
     series: Vec<Series>,
+    /// What gauges have shown by now, and where that is said first.
+    read: HashMap<Shown, String>,
     warnings: Vec<String>,
 }
+
+/// What a gauge has shown: its name, the load test, when, and the bits of the value.
+type Shown = (String, Option<String>, Option<Date>, u64);
 
 impl<'a> Placing<'a> {
     fn new(scene: &'a Scene, own: &'a Evidence) -> Self {
@@ -106,6 +114,7 @@ impl<'a> Placing<'a> {
             gauges: Vec::new(),
             readings: Vec::new(),
             series: Vec::new(),
+            read: HashMap::new(),
             warnings: Vec::new(),
         }
     }
@@ -120,7 +129,7 @@ impl<'a> Placing<'a> {
     fn member(&mut self, place: &str, id: &str) -> Option<usize> {
         let index = self.index_of.get(id).copied();
         if index.is_none() {
-            let message = no_member(id, self.scene.members.iter().map(|m| m.id.as_str()));
+            let message = no_member(id, &self.scene.members);
             self.error(place.to_owned(), "UNKNOWN_MEMBER", message);
         }
         index
@@ -145,7 +154,9 @@ impl<'a> Placing<'a> {
             }
         }
         for (i, reading) in file.readings.iter().enumerate() {
-            self.gauge(&at("readings", i, "of"), &reading.of, IN_EVIDENCE);
+            if let Some(gauge) = self.gauge(&at("readings", i, "of"), &reading.of, IN_EVIDENCE) {
+                self.sound(at("readings", i, "value"), &gauge, reading.value);
+            }
             if let Some(test) = &reading.test {
                 self.test(&at("readings", i, "test"), test);
             }
@@ -157,9 +168,17 @@ impl<'a> Placing<'a> {
         }
         for (i, slices) in file.slices.iter().enumerate() {
             if self.member(&at("slices", i, "member"), &slices.member).is_some() {
+                let member = self.index_of.get(slices.member.as_str());
+                let member = member.and_then(|k| self.scene.members.get(*k));
                 for (k, one) in slices.slices.iter().enumerate() {
                     let place = at("slices", i, &format!("slices[{k}].name"));
                     self.name(place, &slices.member, one.name());
+                    let drilled = one.drilled();
+                    let deep = member.zip(drilled.depth_m);
+                    if let Some(why) = deep.and_then(|(m, d)| too_deep(m, drilled.angle_deg, d)) {
+                        let place = at("slices", i, &format!("slices[{k}].depth_m"));
+                        self.error(place, "DEPTH", why);
+                    }
                 }
             }
         }
@@ -222,6 +241,9 @@ impl<'a> Placing<'a> {
             Some(Err(why)) => return self.error(reading.field("face"), "FACE", why),
             None => seat.angle_deg.map(|angle| angle.rem_euclid(360.0)),
         };
+        if let Some(why) = seat.depth_mm.and_then(|mm| too_deep(member, angle_deg, 1e-3 * mm)) {
+            return self.error(reading.field("depth_mm"), "DEPTH", why);
+        }
         if let Some(known) = self.known(&what.of) {
             // On which member it is, `reading` compares.
             if known.member == what.member
@@ -288,6 +310,41 @@ impl<'a> Placing<'a> {
         }
     }
 
+    /// Refuses what a gauge on its member does not read; SI.
+    fn sound(&mut self, place: String, gauge: &Gauge, value: f64) {
+        let percent = 100.0 * value.abs();
+        let why = match gauge.measures {
+            Measures::Strain(_) if percent > MOST_STRAIN => Some(format!(
+                "{value} is a strain of {percent} %, at which nothing is left: it is in m/m, 1e-6 for a millionth"
+            )),
+            _ => {
+                let member = self.index_of.get(gauge.member.as_str());
+                let member = member.and_then(|k| self.scene.members.get(*k));
+                member.and_then(|member| too_far(member, gauge, value))
+            }
+        };
+        if let Some(why) = why {
+            self.error(place, "UNIT", why);
+        }
+    }
+
+    /// Refuses what another table has said already.
+    fn twice(&mut self, reading: &Placed<RawReading>) -> bool {
+        let what = &reading.what;
+        let key = (what.of.clone(), what.test.clone(), what.date, what.value.to_bits());
+        let table = |place: &str| place.rsplit_once(':').map_or("", |(file, _)| file).to_owned();
+        let first = self.read.entry(key).or_insert_with(|| reading.place.clone()).clone();
+        let is_twice = table(&first) != table(&reading.place);
+        if is_twice {
+            let message = format!(
+                "{} shows what {first} has already, so that it would count twice: leave one of the two tables out",
+                shorten(&what.of)
+            );
+            self.error(reading.field("value"), "DUPLICATE", message);
+        }
+        is_twice
+    }
+
     fn reading(&mut self, reading: &Placed<RawReading>) {
         let what = &reading.what;
         if let Some(test) = &what.test {
@@ -299,8 +356,13 @@ impl<'a> Placing<'a> {
         }
         let place = reading.field("gauge");
         let Some(gauge) = self.gauge(&place, &what.of, IN_COLUMNS) else { return };
+        if gauge.member == what.member {
+            self.sound(reading.field("value"), &gauge, what.value);
+        }
         if gauge.member != what.member {
-            let message = format!("{} is on {}, not on {}", gauge.name, gauge.member, what.member);
+            let name = |id: &str| self.scene.name_of(id).to_owned();
+            let [own, other] = [&gauge.member, &what.member].map(|id| name(id));
+            let message = format!("{} is on {own}, not on {other}", gauge.name);
             self.error(place, "OTHER_MEMBER", message);
         } else if !what.unit.fits(&gauge.measures) {
             let right = match gauge.measures {
@@ -310,6 +372,8 @@ impl<'a> Placing<'a> {
             };
             let message = format!("{} measures {right}, not in {}", gauge.name, what.unit.name());
             self.error(reading.field("value"), "UNIT", message);
+        } else if self.twice(reading) {
+            // It has been told.
         } else if let (Some(date), None) = (what.date, &what.test) {
             let sample = Sample {
                 date,
@@ -356,6 +420,12 @@ impl<'a> Placing<'a> {
                 what.member
             );
             return self.error(record.field(name), "UNIT", message);
+        }
+        if let Finding::Spall { depth_mm: Some(mm), .. } = what.shows {
+            let member = &self.scene.members[index];
+            if let Some(why) = too_deep(member, spot.angle_deg, 1e-3 * mm as f32) {
+                return self.error(record.field("shows.depth_mm"), "DEPTH", why);
+            }
         }
         let shows = self.shows(index, what);
         self.observations.push(Observation {
@@ -519,17 +589,75 @@ fn area(finding: &Finding) -> Option<(&'static str, f64)> {
     }
 }
 
-/// What to say of an id that no member has.
-pub(crate) fn no_member<'a>(id: &str, known: impl Iterator<Item = &'a str>) -> String {
-    let mut known: Vec<&str> = known.collect();
+/// What to say of a word that no member has as its id or name. People know members by their names:
+/// ids stand where there is none.
+pub(crate) fn no_member(word: &str, members: &[Member]) -> String {
+    let called = |m: &'_ Member| if m.name.is_empty() { m.id.clone() } else { m.name.clone() };
+    let names: Vec<String> = members.iter().map(called).collect();
+    let mut known: Vec<&str> = names.iter().map(String::as_str).collect();
     known.sort_unstable();
-    let hint = match nearest(id, &known) {
+    known.dedup();
+    let ids: Vec<&str> = members.iter().map(|m| m.id.as_str()).collect();
+    let hint = match nearest(word, &known).or_else(|| nearest(word, &ids)) {
         Some(meant) => format!("did you mean \"{}\"?", shorten(meant)),
         None if known.is_empty() => "there is none".into(),
         None => {
-            let few: Vec<&str> = known.into_iter().take(20).collect();
-            format!("there are {}", shorten(&few.join(", ")))
+            let few: Vec<String> =
+                known.iter().take(MEMBERS).map(|n| format!("\"{}\"", shorten(n))).collect();
+            let more = match known.len() {
+                n if n > MEMBERS => {
+                    format!(" and {} more (`intrados info` lists them)", n - MEMBERS)
+                }
+                _ => String::new(),
+            };
+            format!("there are {}{more}", few.join(", "))
         }
     };
-    format!("no member has the id \"{}\": {hint}", shorten(id))
+    format!("no member has the id or name \"{}\": {hint}", shorten(word))
+}
+
+/// How many members a message names.
+const MEMBERS: usize = 12;
+
+/// How far it is through a member from a side, or from its thickest where nobody says which, m.
+fn through(member: &Member, angle_deg: Option<f32>) -> f32 {
+    let size = member.bounds[1] - member.bounds[0];
+    let along = |way: glam::Vec3| way.abs().dot(size);
+    match angle_deg {
+        Some(angle) => along(member.frame.radial(angle)),
+        None => along(member.frame.zero).max(along(member.frame.ninety())),
+    }
+}
+
+/// Why something cannot lie so deep in a member.
+fn too_deep(member: &Member, angle_deg: Option<f32>, depth_m: f32) -> Option<String> {
+    let through = through(member, angle_deg);
+    (through > 0.0 && depth_m > through * (1.0 + SAME_PLACE)).then(|| {
+        format!(
+            "{:.0} mm is deeper than {} is, {:.0} mm: is it in mm?",
+            1e3 * depth_m,
+            called(member),
+            1e3 * through
+        )
+    })
+}
+
+/// A member by its name, or its id where it has none.
+fn called(member: &Member) -> &str {
+    if member.name.is_empty() { &member.id } else { &member.name }
+}
+
+/// Why a member does not move so far.
+fn too_far(member: &Member, gauge: &Gauge, value: f64) -> Option<String> {
+    let size = (member.bounds[1] - member.bounds[0]).length();
+    let is_far = matches!(gauge.measures, Measures::Displacement(_))
+        && size > 0.0
+        && value.abs() > f64::from(size);
+    is_far.then(|| {
+        format!(
+            "{} m is more than {} is long, {size:.2} m: in mm? give the unit mm",
+            value,
+            called(member)
+        )
+    })
 }

@@ -8,7 +8,7 @@ use super::{
     check::{check_record, check_seat},
 };
 use crate::{
-    file::{nearest, shorten},
+    file::{edit_distance, nearest, shorten},
     problem::Problem,
     structure::{Date, Direction, Electrode, Measures},
 };
@@ -17,6 +17,11 @@ use crate::{
 const MAX_ROWS: usize = 200_000;
 /// How many problems of a table are listed before the list is cut.
 const MAX_PROBLEMS: usize = 50;
+
+/// Beyond this no gauge is read, %: steel breaks before.
+pub(super) const MOST_STRAIN: f64 = 10.0;
+/// What no gauge can tell from nought.
+const LEAST_STRAIN: f64 = 0.05e-6;
 
 /// What a column holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -125,6 +130,20 @@ impl GaugeUnit {
         }
     }
 
+    /// Why a gauge on a structure does not read so much.
+    fn absurd(self, shown: f64) -> Option<String> {
+        let percent = 100.0 * self.si() * shown.abs();
+        match self {
+            Self::Strain if percent > MOST_STRAIN => Some(format!(
+                "{shown} m/m is a strain of {percent} %, at which nothing is left: in ue? give the unit ue"
+            )),
+            Self::MicroStrain if percent > MOST_STRAIN => Some(format!(
+                "{shown} ue is a strain of {percent} %, at which nothing is left: are these counts of the amplifier? give them in ue"
+            )),
+            _ => None,
+        }
+    }
+
     /// What a gauge measures that is read in it, and of which nothing but its place is said: strain
     /// along the axis, or displacement upwards. None: its direction must be said.
     pub(crate) fn usual(self) -> Option<Measures> {
@@ -219,6 +238,8 @@ pub(crate) struct Seat {
 pub(crate) struct Rows {
     pub(crate) records: Vec<Placed<Record>>,
     pub(crate) readings: Vec<Placed<RawReading>>,
+    /// What was passed over, for people.
+    pub(crate) note: Option<String>,
 }
 
 /// Reads a table. `file` is its name in messages.
@@ -228,7 +249,7 @@ pub(crate) struct Rows {
 pub(crate) fn read(file: &str, bytes: &[u8], survey: &Survey) -> Result<Rows, Vec<Problem>> {
     let table = Table::open(file, bytes, survey).map_err(|p| vec![p])?;
     let rows = table.rows(bytes).map_err(|p| vec![p])?;
-    let mut out = Rows::default();
+    let mut out = Rows { note: table.note(), ..Rows::default() };
     let mut problems = Vec::new();
     match table.holds {
         Holds::One { kind, column, factor } => {
@@ -255,6 +276,7 @@ pub(crate) fn read(file: &str, bytes: &[u8], survey: &Survey) -> Result<Rows, Ve
             for row in &rows {
                 take(table.reading(row, unit), &mut out.readings, &mut problems);
             }
+            problems.extend(table.hardly_strained(unit, &out.readings));
         }
     }
     if !problems.is_empty() {
@@ -310,7 +332,10 @@ enum Holds {
 struct Table<'a> {
     file: &'a str,
     survey: &'a Survey,
-    columns: Vec<Column>,
+    /// None: a column that says nothing to us.
+    columns: Vec<Option<Column>>,
+    /// Names of those.
+    strange: Vec<String>,
     separator: u8,
     holds: Holds,
 }
@@ -334,10 +359,11 @@ impl<'a> Table<'a> {
             file,
             survey,
             columns: Vec::new(),
+            strange: Vec::new(),
             separator,
             holds: Holds::Profiles { column: Column::OfCement },
         };
-        table.columns = table.header(bytes)?;
+        (table.columns, table.strange) = table.header(bytes)?;
         table.holds = table.told()?;
         Ok(table)
     }
@@ -354,23 +380,44 @@ impl<'a> Table<'a> {
         Problem::error(self.file, "SYNTAX", format!("cannot be read as CSV: {error}"))
     }
 
-    /// The columns by their names.
-    fn header(&self, bytes: &[u8]) -> Result<Vec<Column>, Problem> {
+    /// The columns by their names, and the names that nobody knows.
+    fn header(&self, bytes: &[u8]) -> Result<(Vec<Option<Column>>, Vec<String>), Problem> {
         let mut reader = self.reader(bytes);
         let names = reader.headers().map_err(|e| self.broken(&e))?;
-        let mut columns = Vec::new();
+        let (mut columns, mut strange) = (Vec::new(), Vec::new());
         for name in names {
             let known = COLUMNS.iter().find(|(known, _)| known.eq_ignore_ascii_case(name));
             let Some((name, column)) = known else {
-                return Err(self.in_header("UNKNOWN_COLUMN", unknown_column(name)));
+                if let Some(why) = mistaken(name) {
+                    return Err(self.in_header("UNKNOWN_COLUMN", why));
+                }
+                columns.push(None);
+                strange.push(name.to_owned());
+                continue;
             };
-            if columns.contains(column) {
+            if columns.contains(&Some(*column)) {
                 let message = format!("the column {name} is there twice: keep one of them");
                 return Err(self.in_header("DUPLICATE", message));
             }
-            columns.push(*column);
+            columns.push(Some(*column));
         }
-        Ok(columns)
+        Ok((columns, strange))
+    }
+
+    /// Which columns were passed over.
+    fn note(&self) -> Option<String> {
+        let names: Vec<&str> = self.strange.iter().map(String::as_str).collect();
+        let named: Vec<&str> = names.iter().copied().filter(|n| !n.is_empty()).collect();
+        if named.is_empty() {
+            return None;
+        }
+        let list = shorten(&named.join(", "));
+        let (column, is, it) = match named.len() {
+            1 => ("column", "is", "its"),
+            _ => ("columns", "are", "their"),
+        };
+        let file = self.file;
+        Some(format!("{file}: the {column} {list} {is} not known and {it} cells not read"))
     }
 
     fn in_header(&self, code: &'static str, message: String) -> Problem {
@@ -378,13 +425,13 @@ impl<'a> Table<'a> {
     }
 
     fn has(&self, column: Column) -> bool {
-        self.columns.contains(&column)
+        self.columns.contains(&Some(column))
     }
 
     /// What the columns say that the table holds.
     fn told(&self) -> Result<Holds, Problem> {
         let mut told = Vec::new();
-        for &column in &self.columns {
+        for &column in self.columns.iter().flatten() {
             match column {
                 Column::Of(kind) => told.push(Holds::One { kind, column, factor: 1.0 }),
                 Column::OfCement | Column::OfConcrete => told.push(Holds::Profiles { column }),
@@ -395,7 +442,10 @@ impl<'a> Table<'a> {
         }
         let [holds] = told[..] else {
             let message = if told.is_empty() {
-                format!("no column says what was measured: name {KINDS}")
+                match self.strange.first() {
+                    Some(name) => unknown_column(name),
+                    None => format!("no column says what was measured: name {KINDS}"),
+                }
             } else {
                 format!("more than one column says what was measured: keep {KINDS}")
             };
@@ -426,8 +476,8 @@ impl<'a> Table<'a> {
         let in_need = |column: &&Column| {
             gauges && matches!(column, Column::Face | Column::Angle | Column::Depth)
         };
-        if let Some(column) = self.columns.iter().find(in_need).filter(|_| !self.has(Column::Along))
-        {
+        let known = || self.columns.iter().flatten();
+        if let Some(column) = known().find(in_need).filter(|_| !self.has(Column::Along)) {
             let message = "is a gauge's together with along: add the column along, or take it out";
             return Some(format!("the column {} {message}", column.name()));
         }
@@ -435,7 +485,7 @@ impl<'a> Table<'a> {
             true => "is none of a gauge, whose place is along with face or angle_deg",
             false => "says nothing beside the other columns",
         };
-        let stray = self.columns.iter().find(is_stray)?;
+        let stray = known().find(is_stray)?;
         Some(format!("the column {} {why}: take it out", stray.name()))
     }
 
@@ -583,7 +633,11 @@ impl<'a> Table<'a> {
         let Some(of) = row.text(Column::Gauge) else {
             return Err(row.wrong(Column::Gauge, "EMPTY", "names no gauge"));
         };
-        let value = unit.si() * row.number(Column::Value)?;
+        let shown = row.number(Column::Value)?;
+        if let Some(why) = unit.absurd(shown) {
+            return Err(row.wrong(Column::Value, "UNIT", why));
+        }
+        let value = unit.si() * shown;
         let std_error = match row.optional(Column::StdError)? {
             Some(error) if error > 0.0 => unit.si() * error,
             Some(error) => {
@@ -604,6 +658,21 @@ impl<'a> Table<'a> {
         let what =
             RawReading { member, of, seat, test, date, temperature_c, value, std_error, unit };
         Ok(Placed { place: row.place(), is_row: true, what })
+    }
+
+    /// Refuses millionths none of which is as much as any gauge can tell from nought.
+    fn hardly_strained(&self, unit: GaugeUnit, rows: &[Placed<RawReading>]) -> Option<Problem> {
+        let values = || rows.iter().map(|row| row.what.value.abs());
+        let largest = values().fold(0.0, f64::max);
+        let hardly = unit == GaugeUnit::MicroStrain && largest > 0.0 && largest < LEAST_STRAIN;
+        hardly.then(|| {
+            let message = format!(
+                "none is above {} ue, less than any gauge can tell: in m/m? give the unit m/m",
+                1e6 * LEAST_STRAIN
+            );
+            let place = format!("{}: column {}", self.file, Column::Value.name());
+            Problem::error(place, "UNIT", message)
+        })
     }
 
     /// Where a row says that its gauge is.
@@ -644,6 +713,21 @@ impl<'a> Table<'a> {
     }
 }
 
+/// What to do about a column whose name is nearly that of one that we know, or that of one without
+/// its unit: to pass over it would lose what was measured.
+fn mistaken(name: &str) -> Option<String> {
+    let lower = name.to_ascii_lowercase();
+    let nearly = |known: &&str| {
+        known.len() > 3 && !lower.is_empty() && edit_distance(&lower, known) <= 1
+            || known.strip_prefix(lower.as_str()).is_some_and(|rest| rest.starts_with('_'))
+    };
+    let is_known = COLUMNS.iter().map(|(name, _)| *name).any(|known| nearly(&known));
+    (is_known || POTENTIALS.contains(&lower.as_str())).then(|| unknown_column(name))
+}
+
+/// Names of potentials that say no unit.
+const POTENTIALS: [&str; 6] = ["potential", "potential_mv", "half_cell", "half-cell", "e", "v"];
+
 /// What to do about a column of which nobody knows the name.
 fn unknown_column(name: &str) -> String {
     let names: Vec<&str> = COLUMNS.iter().map(|(name, _)| *name).collect();
@@ -656,8 +740,7 @@ fn unknown_column(name: &str) -> String {
             "the column \"{short}\" says no unit: give it in that of {known}, and call it so"
         );
     }
-    let potential = ["potential", "potential_mv", "half_cell", "half-cell", "e", "v"];
-    if potential.contains(&lower.as_str()) {
+    if POTENTIALS.contains(&lower.as_str()) {
         return format!(
             "the column \"{short}\" says no unit: give potentials in mV, and call it so"
         );
@@ -699,7 +782,7 @@ impl Row<'_> {
 
     /// What a cell holds, if it holds anything.
     fn text(&self, column: Column) -> Option<&str> {
-        let index = self.table.columns.iter().position(|c| *c == column)?;
+        let index = self.table.columns.iter().position(|c| *c == Some(column))?;
         self.cells.get(index).filter(|cell| !cell.is_empty())
     }
 

@@ -12,7 +12,7 @@ use serde_json::Value;
 use super::Notes;
 use crate::{
     Frame, Member, MemberKind, Object, Part,
-    gltf::{json::Json, steel},
+    gltf::{NO_CLASS, json::Json, steel},
 };
 
 /// What a node says of itself.
@@ -382,7 +382,7 @@ impl Members {
             })
             .count();
         if assumed > 0 {
-            notes.push(format!("{assumed} members state no concrete class: C30/37 is assumed"));
+            notes.push(format!("{assumed} {NO_CLASS}: C30/37 is assumed"));
         }
         let silent: HashSet<_> = list
             .iter()
