@@ -16,11 +16,12 @@ use intrados_scene::{
     structure::{Date, Georeference},
 };
 use serde_json::json;
-use view::{View, surface, view};
+use view::{View, view};
 use zip::{CompressionMethod, DateTime, ZipWriter, write::SimpleFileOptions};
 
 use crate::{
     basis::Basis,
+    surface::concrete,
     words::{
         NOTHING, bad_probability, defect, due, finding, level, matters, metres, word, worse_half,
     },
@@ -75,7 +76,7 @@ pub fn bcf(
             found.push(None);
         }
         let index = scene.members.iter().position(|m| m.id == member.id);
-        let surface = index.filter(|_| !found.is_empty()).map(|i| surface(scene, i));
+        let surface = index.filter(|_| !found.is_empty()).map(|i| concrete(scene, i));
         for defect in found {
             let topic = Told { member, defect };
             let view = index.zip(surface.as_ref()).map(|(i, surface)| {
