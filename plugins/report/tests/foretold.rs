@@ -38,7 +38,7 @@ fn salt_without_numbers_is_assumed_with_its_spread() {
     assert_eq!(member.basis, Basis::Foretold);
     assert!(member.state.starts_with("foretold between"), "{}", member.state);
     assert!(
-        member.advice.starts_with("Look first") && !member.advice.contains("No action"),
+        member.advice.starts_with("Inspect") && !member.advice.contains("No action"),
         "{}",
         member.advice
     );
