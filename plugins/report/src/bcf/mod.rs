@@ -43,6 +43,8 @@ const TYPES: [&str; 2] = ["Defect", "Issue"];
 const OPEN: [&str; 1] = ["Open"];
 /// By the worst state that a member may be in, from the best.
 const PRIORITIES: [&str; 4] = ["Low", "Medium", "High", "Critical"];
+/// That of what is to be inspected, since nobody has looked at it enough.
+const NORMAL: usize = 1;
 /// Name of a topic's camera.
 const VIEWPOINT: &str = "viewpoint.bcfv";
 /// Width over height of the picture that a camera is for.
@@ -165,7 +167,10 @@ impl Teller<'_> {
                 topic_type: TYPES[usize::from(told.defect.is_none())],
                 status: OPEN[0],
                 title: format!("{}: {}", m.name, told.defect.map_or_else(|| finding(m), defect)),
-                priority: m.state_run.map(|[_, worst]| PRIORITIES[level(worst, states)]),
+                priority: m.state_run.map(|[_, worst]| match m.to_inspect {
+                    true => PRIORITIES[NORMAL],
+                    false => PRIORITIES[level(worst, states)],
+                }),
                 creation_date: self.created.clone(),
                 creation_author: format!("Intrados {}", self.prediction.version),
                 due_date: m
