@@ -77,6 +77,16 @@ impl Basis {
     }
 }
 
+impl MemberBasis {
+    /// Whether all that is said of two members is the same.
+    pub(crate) fn is_built_like(&self, other: &Self) -> bool {
+        fn said(b: &MemberBasis) -> [&str; 5] {
+            [&b.size, &b.concrete, &b.steel, &b.exposure, &b.loads]
+        }
+        said(self) == said(other) && self.assumed == other.assumed
+    }
+}
+
 /// The middle of the scene on the map of its model, or what the model says of its site.
 fn on_earth(scene: &Scene) -> String {
     let place = &scene.structure.georeference;

@@ -66,7 +66,7 @@ fn salt_without_numbers_is_assumed_with_its_spread() {
     for text in [
         "Assumed, not measured",
         "fib Bulletin 34",
-        "foretold only, nothing measured",
+        "forecast only, nothing measured",
         "no slices were read",
     ] {
         assert!(read("report.html").contains(text), "{text}");
@@ -100,7 +100,7 @@ fn what_is_not_computed_is_not_nothing() {
             && evidence.details["rust"]["why_not"].as_str().unwrap().contains("XD2")
     );
     assert!(
-        prediction.limits.iter().any(|l| l.contains("not computed for 1 members")),
+        prediction.limits.iter().any(|l| l.contains("not computed for 1 member ")),
         "{:?}",
         prediction.limits
     );

@@ -225,8 +225,12 @@ impl Said {
 fn basis(used: &[&Placed], steel: &rust::Weighed) -> String {
     let mut kinds: BTreeMap<&str, usize> = BTreeMap::new();
     used.iter().for_each(|p| *kinds.entry(p.shows.kind()).or_default() += 1);
-    let list: Vec<String> = kinds.iter().map(|(kind, n)| format!("{n} {kind}")).collect();
-    let mut text = format!("{} observations ({})", used.len(), list.join(", "));
+    let list: Vec<String> = kinds
+        .iter()
+        .map(|(kind, n)| if *n == 1 { (*kind).to_owned() } else { format!("{n} × {kind}") })
+        .collect();
+    let noun = if used.len() == 1 { "observation" } else { "observations" };
+    let mut text = format!("{} {noun} ({})", used.len(), list.join(", "));
     if let Some((zone, active)) = steel.worst() {
         text += &format!(
             "; bars rust with a probability of {:.0} % at {} of the axis",

@@ -56,7 +56,7 @@ impl Predictor {
             *why = (!counted).then(|| match gathered.evidence[source].measured {
                 true => "the grading profile declares correlations that cannot be".into(),
                 false => {
-                    "what is foretold yields to what is measured, since the two differ by more than chance gives once in twenty".into()
+                    "measurements take precedence over the forecast, which differs from them by more than chance explains".into()
                 }
             });
         }
@@ -316,9 +316,14 @@ fn unforeseen<'a>(
         {
             let [from, to] = o.spot.along;
             Some(format!(
-                "{}: a diagonal crack {width_mm:.2} ± {std_error_mm:.2} mm wide at {:.2} of the axis, where the forecast opens none wider than {foretold:.2} mm",
+                "{}: a diagonal crack {width_mm:.2} ± {std_error_mm:.2} mm wide at {:.0} % of the length, where the forecast expects {}",
                 o.name,
-                0.5 * (from + to),
+                50.0 * (from + to),
+                if foretold < 0.005 {
+                    "none".into()
+                } else {
+                    format!("none wider than {foretold:.2} mm")
+                }
             ))
         }
         _ => None,
