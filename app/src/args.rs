@@ -1045,7 +1045,7 @@ pub(crate) struct Predict {
     /// Who decides what is a pore or a crack in slices; auto: the network
     #[arg(long, value_enum, default_value_t)]
     pub(crate) method: Method,
-    /// Years from now on for which damage is foretold
+    /// Years from now on that the forecast reaches
     #[arg(long, value_name = "YEARS", default_value_t = 20.0, value_parser = years)]
     pub(crate) ahead: f64,
     /// Edge of the elements of forecasts, m; some 150 elements a member if absent

@@ -114,6 +114,29 @@ fn a_crack_of_three_inspections_is_one_with_its_course() {
     assert!(filled["damage"].as_f64().unwrap() < 0.1, "{}", filled["damage"]);
 }
 
+/// What only a developer of the program knows is no word for an owner.
+#[test]
+fn the_page_speaks_its_owners_language() {
+    let (page, _, _) = predicted(&[]);
+    for word in [
+        "foretold",
+        "χ²",
+        "blind to",
+        "readings[",
+        "ecm_gpa",
+        "predict.json",
+        "Scene <b>",
+        "Score against",
+        "1 observations",
+        "1 members",
+        "Look first",
+    ] {
+        assert!(!page.contains(word), "{word}");
+    }
+    let items = &page[page.find("id=\"evidence\"").unwrap()..page.find("id=\"grading\"").unwrap()];
+    assert_eq!(items.matches("class=\"group\"").count(), 3, "{items}");
+}
+
 /// A member of which half was seen and found intact was to be repaired within a year.
 #[test]
 fn what_was_not_looked_at_is_to_be_inspected() {

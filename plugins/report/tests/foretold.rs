@@ -72,6 +72,7 @@ fn salt_without_numbers_is_assumed_with_its_spread() {
         assert!(read("report.html").contains(text), "{text}");
     }
     assert!(!read("report.html").contains("Sauvola"));
+    assert!(!read("report.html").contains("foretold"));
     assert!(
         read("members.csv").contains(",foretold,")
             && read("members.csv").contains("assumed by exposure class")

@@ -53,7 +53,7 @@ const VIEWPOINT: &str = "viewpoint.bcfv";
 /// Name of what the defect looks like.
 const SNAPSHOT: &str = "snapshot.png";
 /// Its longer side, pixels.
-const SNAPSHOT_SIDE: u32 = 800;
+const SNAPSHOT_SIDE: u32 = 480;
 /// Width over height of the picture that a camera is for.
 const ASPECT: f64 = 4.0 / 3.0;
 /// Its angle from bottom to top, degrees.
