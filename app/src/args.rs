@@ -1063,7 +1063,7 @@ pub(crate) struct Predict {
     /// Who decides what is a pore or a crack in slices; auto: the network
     #[arg(long, value_enum, default_value_t)]
     pub(crate) method: Method,
-    /// Years from now on for which damage is foretold
+    /// Years from now on that the forecast reaches
     #[arg(long, value_name = "YEARS", default_value_t = 20.0, value_parser = years)]
     pub(crate) ahead: f64,
     /// Edge of the elements of forecasts, m; some 150 elements a member if absent
@@ -1087,6 +1087,32 @@ pub(crate) struct Predict {
     /// Folder for the report and its tables
     #[arg(long, value_name = "DIR", default_value = "out")]
     pub(crate) out: PathBuf,
+    #[command(flatten)]
+    pub(crate) cover: Cover,
+}
+
+/// What stands on the cover of a report, in the place of what the scene's `project` says.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Cover of the report, instead of what the scene says")]
+pub(crate) struct Cover {
+    /// What its owner calls the structure
+    #[arg(long, value_name = "NAME")]
+    pub(crate) structure: Option<String>,
+    /// Who owns it
+    #[arg(long, value_name = "NAME")]
+    pub(crate) owner: Option<String>,
+    /// Who has inspected it
+    #[arg(long, value_name = "NAME")]
+    pub(crate) inspector: Option<String>,
+    /// Where it stands
+    #[arg(long, value_name = "TEXT")]
+    pub(crate) place: Option<String>,
+    /// Why it is looked at
+    #[arg(long, value_name = "TEXT")]
+    pub(crate) purpose: Option<String>,
+    /// When it was inspected, such as 2026-05-03; what is to be done is due from then on
+    #[arg(long, value_name = "DATE")]
+    pub(crate) inspected: Option<Date>,
 }
 
 #[derive(Debug, Args)]

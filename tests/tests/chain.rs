@@ -82,7 +82,7 @@ fn planted_damage_is_found_within_its_error_bars() {
         (member("sound").state.as_str(), member("sound").basis),
         ("between sound and poor", Basis::Measured)
     );
-    assert!(member("sound").advice.starts_with("Look first"), "{}", member("sound").advice);
+    assert!(member("sound").advice.starts_with("Inspect"), "{}", member("sound").advice);
     assert!((member("sound").state_probability.values().sum::<f64>() - 1.0).abs() < 1e-9);
     assert_eq!(
         (member("spongy").state.as_str(), member("spongy").advice.as_str()),

@@ -12,7 +12,7 @@ use intrados_forecast as forecast;
 use intrados_light::{LitScene, plugin::Lit};
 use intrados_predict::{PredictSettings, Predicting, Prediction, Progress};
 use intrados_report::{Document, Record, check_model};
-use intrados_scene::{Scene, plugin::install};
+use intrados_scene::{Scene, plugin::install, structure::Project};
 use intrados_stage::{Jobs, Pace};
 
 use super::{info::kind_name, render::MapRows, walks};
@@ -25,7 +25,8 @@ use crate::{
 };
 
 pub(crate) fn run(session: &Session, args: &args::Predict) -> Result<Outcome, Failure> {
-    let scene = walks::load(session, &args.scene)?;
+    let mut scene = walks::load(session, &args.scene)?;
+    put_on(&mut Arc::make_mut(&mut scene.structure).project, &args.cover);
     if let Some(model) = &args.ifc {
         check_model(model, &scene)?;
     }
@@ -65,6 +66,24 @@ pub(crate) fn run(session: &Session, args: &args::Predict) -> Result<Outcome, Fa
     output::locked(&parts).forget();
     session.print(&document, || table(&document))?;
     Ok(Outcome::Done)
+}
+
+/// Says on the cover what the command line says.
+fn put_on(project: &mut Project, cover: &args::Cover) {
+    let args::Cover { structure, owner, inspector, place, purpose, inspected } = cover;
+    let said = [
+        (&mut project.structure, structure),
+        (&mut project.owner, owner),
+        (&mut project.inspector, inspector),
+        (&mut project.place, place),
+        (&mut project.purpose, purpose),
+    ];
+    for (on_cover, said) in said {
+        if let Some(said) = said {
+            said.trim().clone_into(on_cover);
+        }
+    }
+    project.inspected = inspected.or(project.inspected);
 }
 
 /// Between two looks at the app's queue.

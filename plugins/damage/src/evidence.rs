@@ -42,6 +42,16 @@ impl Cause {
     }
 }
 
+/// What people call a source of evidence.
+#[must_use]
+pub fn called(source: &str) -> &str {
+    match source {
+        "ct" => "CT",
+        "gauges" => "strain gauges",
+        other => other,
+    }
+}
+
 /// How what was seen in places stands for a zone.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Stands {

@@ -21,7 +21,7 @@ use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    evidence::{Cause, Evidence, Stands, all_causes},
+    evidence::{Cause, Evidence, Stands, all_causes, called},
     zone::{Zones, place},
 };
 
@@ -273,7 +273,9 @@ impl FusionRule {
         if fused.conflict {
             let said: Vec<String> = pieces
                 .iter()
-                .map(|p| format!("{} {:.2} ± {:.2}", p.source, p.reading.value, self.error(p)))
+                .map(|p| {
+                    format!("{} {:.2} ± {:.2}", called(p.source), p.reading.value, self.error(p))
+                })
                 .collect();
             whole.conflicts.push(format!(
                 "{}, {} of the axis: {}",

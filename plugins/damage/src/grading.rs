@@ -53,8 +53,17 @@ pub struct Profile {
     pub crack_limits: Vec<CrackLimit>,
     /// Damage from which a member counts as severe in scores.
     pub severe_from: f64,
+    /// Within how many months to inspect what is probably sound and has not been looked at enough;
+    /// none: nobody says.
+    #[serde(default = "two_years")]
+    pub inspect_within_months: Option<u32>,
     /// From best to worst.
     pub states: Vec<State>,
+}
+
+/// Where a profile does not say (ours), months.
+fn two_years() -> Option<u32> {
+    Some(24)
 }
 
 /// How pores and cracks of a section become a damage d: of the strength that sound concrete would

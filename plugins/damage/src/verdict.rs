@@ -6,6 +6,10 @@
 //! a crack width on, and the two are taken as if they knew nothing of each other: P(at least) = 1 −
 //! (1 − P(d ≥ from)) Π (1 − P(w ≥ width)). A state is named when it is as likely as [`NAMED`]; else
 //! the smallest run of neighbours that is.
+//!
+//! What follows from that: nothing unknown is called sound, and nothing unknown is called poor.
+//! Where nothing was found and the best estimate is sound, the error bar is wide because nobody has
+//! looked enough, and what is to be done is to look.
 
 use intrados_stage::Estimate;
 use std::collections::BTreeMap;
@@ -70,6 +74,42 @@ impl Basis {
     }
 }
 
+/// How far somebody has looked at a member.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Looked {
+    /// Whether anything was found to be wrong with it.
+    pub found: bool,
+    /// Share of its length that nobody has measured or seen, 0 to 1.
+    pub unseen: f64,
+}
+
+impl Looked {
+    /// Nobody has looked at anything.
+    pub const NOWHERE: Self = Self { found: false, unseen: 1.0 };
+
+    /// By what is said of a member: a place counts as looked at where somebody measured or saw it,
+    /// and not where the word of another place reaches. A crack that was measured was found, and so
+    /// was a damage that the profile does not call sound.
+    #[must_use]
+    pub fn of(profile: &Profile, evidence: &[&Evidence]) -> Self {
+        let measured = || evidence.iter().filter(|e| e.measured);
+        let own = |e: &Evidence, zone: usize| {
+            e.zones.iter().any(|(cause, zones)| {
+                let stands = e.stands.get(cause).map(|s| s[zone]);
+                zones.0[zone].is_some() && stands.is_none_or(|s| s.prior.is_none())
+            })
+        };
+        let is_unseen = |&zone: &usize| !measured().any(|e| own(e, zone));
+        let unseen = (0..ZONES).filter(is_unseen).count();
+        let damaged = |e: &Evidence| {
+            let zones = e.by_zone().0;
+            zones.iter().flatten().any(|d| d.value >= profile.damaged_from())
+        };
+        let found = |e: &Evidence| e.crack_width_mm.is_some_and(|w| w > 0.0) || damaged(e);
+        Self { found: measured().any(|e| found(e)), unseen: unseen as f64 / ZONES as f64 }
+    }
+}
+
 /// What can be said of a member's state.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Verdict {
@@ -84,8 +124,12 @@ pub struct Verdict {
     pub basis: Basis,
     /// What to do.
     pub advice: String,
-    /// Within how many months, by the worst state that it may be in.
+    /// Within how many months: the inspection's own time where one is all that is to be done, else
+    /// by the worst state that it may be in.
     pub within_months: Option<u32>,
+    /// Whether an inspection is all that is to be done: nothing was found, what is most probable is
+    /// sound, and the error bar is wide because nobody has looked enough.
+    pub to_inspect: bool,
 }
 
 impl Verdict {
@@ -97,6 +141,7 @@ impl Verdict {
         damage: Option<Estimate>,
         cracks: &[Estimate],
         basis: Basis,
+        looked: Looked,
     ) -> Self {
         let Some(damage) = damage.filter(|_| basis != Basis::None) else {
             return Self {
@@ -106,10 +151,15 @@ impl Verdict {
                 basis: Basis::None,
                 advice: String::new(),
                 within_months: None,
+                to_inspect: false,
             };
         };
         let likely = probabilities(&profile.states, damage, cracks);
         let [best, worst] = run(&likely);
+        let widest = cracks.iter().map(|w| w.value).fold(0.0, f64::max);
+        let is_settled = basis == Basis::Measured && best == worst;
+        let is_probably_sound = profile.state(damage.value, widest) == profile.states.first();
+        let to_inspect = is_probably_sound && !looked.found && !is_settled;
         let name = |k: usize| profile.states[k].name.as_str();
         let said = if best == worst {
             name(best).to_owned()
@@ -126,8 +176,17 @@ impl Verdict {
                 .collect(),
             run: Some([best, worst]),
             basis,
-            advice: advice(profile, [best, worst], basis),
-            within_months: profile.states[worst].within_months,
+            advice: if to_inspect {
+                inspection(basis, looked)
+            } else {
+                advice(profile, [best, worst], basis)
+            },
+            within_months: if to_inspect {
+                profile.inspect_within_months
+            } else {
+                profile.states[worst].within_months
+            },
+            to_inspect,
         }
     }
 
@@ -135,6 +194,20 @@ impl Verdict {
     #[must_use]
     pub fn is_settled(&self) -> bool {
         self.basis == Basis::Measured && self.run.is_some_and(|[best, worst]| best == worst)
+    }
+}
+
+/// Where nothing was found and what is most probable is sound: what is not known is no damage, and
+/// calls for eyes, not for repair.
+fn inspection(basis: Basis, looked: Looked) -> String {
+    let percent = (100.0 * looked.unseen).round();
+    if basis == Basis::Foretold {
+        "Inspect: nobody has looked at it yet, and the forecast expects no damage.".into()
+    } else if percent > 0.0 {
+        format!("Inspect: nothing was found, but {percent} % of the length has not been looked at.")
+    } else {
+        "Inspect: nothing was found, but what has been looked at so far does not rule damage out."
+            .into()
     }
 }
 
@@ -147,16 +220,18 @@ fn advice(profile: &Profile, [best, worst]: [usize; 2], basis: Basis) -> String 
     }
     let look = match basis {
         Basis::Measured => {
-            "Look first: what was measured leaves open which state it is in; more cores or gauges would tell."
+            "Inspect more closely: the findings so far leave its state open; more cores or gauges would settle it."
         }
         _ => {
-            "Look first: nothing was measured on it, its state is only foretold; an inspection, cores or gauges under a load test would tell."
+            "Inspect: nothing was measured on it, and the forecast expects damage; an inspection, cores or gauges under a load test would show."
         }
     };
     if worst == 0 {
         look.to_owned()
     } else {
-        format!("{look} Until then as if {}: {}", state.name, state.advice)
+        let mut todo = state.advice.chars();
+        let first = todo.next().map(|c| c.to_lowercase().to_string()).unwrap_or_default();
+        format!("{look} Until then, treat it as {}: {first}{}", state.name, todo.as_str())
     }
 }
 
@@ -212,6 +287,10 @@ pub fn beyond(reading: Estimate, from: f64, most: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{
+        evidence::{Cause, Stands},
+        zone::Zones,
+    };
 
     fn reading(value: f64, std_error: f64) -> Estimate {
         Estimate { value, std_error }
@@ -251,7 +330,8 @@ mod tests {
     #[test]
     fn nobody_looked_is_not_sound() {
         let profile = Profile::default();
-        let verdict = Verdict::of(&profile, Some(reading(0.0, 0.34)), &[], Basis::Foretold);
+        let verdict =
+            Verdict::of(&profile, Some(reading(0.0, 0.34)), &[], Basis::Foretold, Looked::NOWHERE);
         let likely: Vec<f64> =
             ["sound", "fair", "poor", "severe"].map(|s| verdict.probability[s]).to_vec();
         for (found, expected) in likely.iter().zip([0.2321, 0.3075, 0.3218, 0.1386]) {
@@ -259,7 +339,7 @@ mod tests {
         }
         assert_eq!(verdict.state, "foretold between sound and poor");
         assert!(
-            verdict.advice.starts_with("Look first")
+            verdict.advice.starts_with("Inspect")
                 && !verdict.advice.to_lowercase().contains("no action"),
             "{}",
             verdict.advice
@@ -269,7 +349,9 @@ mod tests {
     #[test]
     fn a_state_is_named_when_it_is_likely_enough() {
         let profile = Profile::default();
-        let of = |d: f64, s: f64, basis| Verdict::of(&profile, Some(reading(d, s)), &[], basis);
+        let looked = Looked { found: true, unseen: 0.0 };
+        let of =
+            |d: f64, s: f64, basis| Verdict::of(&profile, Some(reading(d, s)), &[], basis, looked);
         let sound = of(0.0, 0.03, Basis::Measured);
         assert_eq!(
             (sound.state.as_str(), sound.run, sound.is_settled()),
@@ -286,7 +368,7 @@ mod tests {
             for basis in [Basis::Measured, Basis::Foretold] {
                 let verdict = of(d, s, basis);
                 assert!(
-                    verdict.is_settled() || verdict.advice.starts_with("Look first"),
+                    verdict.is_settled() || verdict.advice.starts_with("Inspect"),
                     "{verdict:?}"
                 );
                 assert!(
@@ -296,7 +378,7 @@ mod tests {
                 assert!((verdict.probability.values().sum::<f64>() - 1.0).abs() < 1e-12);
             }
         }
-        assert_eq!(Verdict::of(&profile, None, &[], Basis::None).state, NO_EVIDENCE);
+        assert_eq!(Verdict::of(&profile, None, &[], Basis::None, looked).state, NO_EVIDENCE);
     }
 
     /// A crack of .3 mm calls for *fair* whatever the damage: .32 ± .08 mm is beyond it with P =
@@ -304,8 +386,10 @@ mod tests {
     #[test]
     fn cracks_have_errors_too() {
         let profile = Profile::default();
+        let looked = Looked { found: true, unseen: 0.0 };
         let of = |w: f64, s: f64| {
-            Verdict::of(&profile, Some(reading(0.0, 0.02)), &[reading(w, s)], Basis::Measured)
+            let crack = [reading(w, s)];
+            Verdict::of(&profile, Some(reading(0.0, 0.02)), &crack, Basis::Measured, looked)
         };
         let likely = of(0.32, 0.08).probability["sound"];
         assert!((likely - (1.0 - 0.5987)).abs() < 1e-3, "{likely}");
@@ -319,8 +403,69 @@ mod tests {
             Some(reading(0.0, 0.02)),
             &[reading(0.32, 0.08), reading(0.32, 0.08)],
             Basis::Measured,
+            looked,
         );
         assert!((both.probability["sound"] - (1.0_f64 - 0.5987).powi(2)).abs() < 1e-3);
+    }
+
+    /// A slab of which one face was seen and found intact was to be treated as poor, with a repair
+    /// planned within a year.
+    #[test]
+    fn nobody_looked_is_not_poor_either() {
+        let profile = Profile::default();
+        let of = |damage, cracks: &[Estimate], basis, looked| {
+            Verdict::of(&profile, Some(damage), cracks, basis, looked)
+        };
+        let half = Looked { found: false, unseen: 0.5 };
+        let seen = of(reading(0.0, 0.24), &[], Basis::Measured, half);
+        assert!(seen.to_inspect && seen.state == "between sound and poor");
+        assert_eq!(
+            seen.advice,
+            "Inspect: nothing was found, but 50 % of the length has not been looked at."
+        );
+        assert_eq!(seen.within_months, Some(24));
+        let foretold = of(reading(0.0, 0.34), &[], Basis::Foretold, Looked::NOWHERE);
+        assert!(foretold.to_inspect && !foretold.advice.contains("poor"));
+        assert_eq!(foretold.within_months, profile.inspect_within_months);
+        // What is settled needs no inspection of its own.
+        let settled = of(reading(0.0, 0.03), &[], Basis::Measured, half);
+        assert!(!settled.to_inspect && settled.within_months == Some(72));
+        // Damage that was found, is more probable than not, or cracks that are foretold count as
+        // before.
+        let found = Looked { found: true, ..half };
+        for verdict in [
+            of(reading(0.08, 0.27), &[], Basis::Measured, found),
+            of(reading(0.12, 0.27), &[], Basis::Measured, half),
+            of(reading(0.2, 0.34), &[], Basis::Foretold, Looked::NOWHERE),
+            of(reading(0.0, 0.34), &[reading(0.4, 0.16)], Basis::Foretold, Looked::NOWHERE),
+        ] {
+            assert!(!verdict.to_inspect && verdict.advice.contains("treat it as"), "{verdict:?}");
+            assert!(verdict.within_months.is_some_and(|months| months <= 12), "{verdict:?}");
+        }
+    }
+
+    /// What reaches a zone from another one is no look at it.
+    #[test]
+    fn a_zone_is_looked_at_where_somebody_was() {
+        let profile = Profile::default();
+        let said = |value, measured| {
+            let zones = Zones(std::array::from_fn(|_| Some(reading(value, 0.1))));
+            let mut e = Evidence::new("x", measured, [(Cause::Concrete, zones)].into(), "".into());
+            let stands = std::array::from_fn(|zone| Stands {
+                between: 0.0,
+                prior: (zone >= 3).then_some(0.3),
+            });
+            if let Some(e) = &mut e {
+                e.stands.insert(Cause::Concrete, stands);
+            }
+            e.unwrap()
+        };
+        let of = |e: &Evidence| Looked::of(&profile, &[e]);
+        assert_eq!(of(&said(0.0, true)), Looked { found: false, unseen: 0.7 });
+        assert_eq!(of(&said(0.3, true)), Looked { found: true, unseen: 0.7 });
+        assert_eq!(of(&said(0.3, false)), Looked::NOWHERE);
+        let cracked = Evidence { crack_width_mm: Some(0.1), ..said(0.0, true) };
+        assert!(of(&cracked).found);
     }
 
     #[test]

@@ -729,8 +729,11 @@ impl Forecast {
             self.rust.says(steel(now))
         );
         if let Some(later) = &self.later {
-            basis +=
-                &format!("; in {:.0} years d {:.2}", self.ahead_years, most(later, |t| t.damage));
+            basis += &format!(
+                "; in {:.0} years damage {:.2}",
+                self.ahead_years,
+                most(later, |t| t.damage)
+            );
         }
         if self.assumed_error > 0.0 {
             basis += "; concrete or bars are assumed, and the error is wider for it";

@@ -17,7 +17,7 @@ pub fn member_of<'s>(scene: &'s Scene, reading: &Reading) -> Option<&'s str> {
 #[must_use]
 pub fn reading_name(number: usize, reading: &Reading) -> String {
     let under = reading.test.as_ref().map_or(String::new(), |test| format!(" under {test}"));
-    format!("readings[{number}], {}{under}", reading.of)
+    format!("{}{under} (reading {})", reading.of, number + 1)
 }
 
 /// Why gauges on a member are not inverted; none where they are.

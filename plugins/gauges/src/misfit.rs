@@ -71,13 +71,13 @@ pub(crate) fn reason(readings: &[GaugeReading]) -> String {
         worst.filter(|w| w.0 > MOST && readings.iter().any(|r| &r.gauge != w.1))
     {
         return format!(
-            "the place of gauge {gauge} or its contact: {:.0} % of χ² are its",
+            "the place of gauge {gauge} or its contact: it accounts for {:.0} % of the misfit",
             100.0 * share
         );
     }
     if is_off(all) {
         return format!(
-            "modulus or loads: readings are {all:.2} times what is expected; a measured modulus (`ecm_gpa`, `ecm_error_gpa` of a concrete) would tell"
+            "modulus or loads: readings are {all:.2} times what is expected; a measured modulus of elasticity of the concrete would tell"
         );
     }
     "supports that are not as described, cracks that open under the load, or damage in more than two places".into()

@@ -306,7 +306,7 @@ pub fn felt_from(
     let most = chi2_point(freedom, ONCE_IN_A_THOUSAND);
     let refused = (best.chi2 > most).then(|| {
         format!(
-            "no damage explains its {} readings, whatever modulus, loads and supports are within reason: χ² is {:.3e}, and more than {most:.0} comes by chance once in a thousand. Likely: {}",
+            "no damage explains its {} readings, whatever modulus, loads and supports are within reason: their squared misfit is {:.3e}, and more than {most:.0} comes by chance once in a thousand. Likely: {}",
             data.len(),
             best.chi2,
             misfit::reason(&told)

@@ -6,7 +6,7 @@ use intrados_ct::Picture;
 use intrados_damage::zone::zone_at;
 use intrados_scene::{
     Scene,
-    structure::{Course, Observation, Shows},
+    structure::{Course, Date, Observation, Shows},
 };
 use intrados_stage::Estimate;
 use intrados_survey::{
@@ -38,8 +38,11 @@ pub struct Defect {
     pub source: &'static str,
     /// Which item of that source.
     pub item: String,
-    /// The day on which it was found, where somebody said it.
+    /// The day on which it was found last, where somebody said it.
     pub date: Option<String>,
+    /// What was found at each inspection, from the earliest to the latest, whose size counts; empty
+    /// of one inspection alone.
+    pub course: Vec<Found>,
     /// What it looks like, small.
     #[serde(skip)]
     pub picture: Option<Picture>,
@@ -48,7 +51,59 @@ pub struct Defect {
     pub photo: Option<PathBuf>,
 }
 
+/// What one inspection found of a defect.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Found {
+    /// When; none: nobody said, and it is taken for as of the day of the prediction.
+    pub date: Option<Date>,
+    /// Which item of its source.
+    pub item: String,
+    /// Width of a crack, mm, or its area, m².
+    pub size: Option<f64>,
+    /// Its standard error.
+    pub std_error: Option<f64>,
+    /// `"mm"` or `"m²"`.
+    pub unit: &'static str,
+}
+
 impl Defect {
+    /// How it has changed from inspection to inspection, for people: `"0.20 (2016), 0.35 (2021),
+    /// 0.60 mm (2026): grew by 0.05 mm a year since 2021"`.
+    #[must_use]
+    pub fn change(&self) -> Option<String> {
+        let known: Vec<(&Found, f64)> =
+            self.course.iter().filter_map(|f| Some((f, f.size?))).collect();
+        let [.., (before, was), (last, is)] = known[..] else { return None };
+        let days: Vec<String> =
+            known.iter().filter_map(|(f, _)| Some(f.date?.to_string())).collect();
+        let are_years = days.windows(2).all(|w| w[0].get(..4) != w[1].get(..4));
+        let day = |f: &Found| match f.date.map(|d| d.to_string()) {
+            Some(day) if are_years => day.get(..4).unwrap_or(&day).to_owned(),
+            Some(day) => day,
+            None => "undated".into(),
+        };
+        let digits = if last.unit == "mm" { 2 } else { 3 };
+        let sizes = known.iter().enumerate().map(|(k, (f, size))| {
+            let unit = if k + 1 == known.len() { format!(" {}", f.unit) } else { String::new() };
+            format!("{size:.digits$}{unit} ({})", day(f))
+        });
+        let sizes = sizes.collect::<Vec<_>>().join(", ");
+        let since = day(before);
+        let error = before.std_error.unwrap_or(0.0).hypot(last.std_error.unwrap_or(0.0));
+        let told = if (is - was).abs() <= 1.96 * error {
+            format!("no change since {since} beyond the error of reading")
+        } else {
+            let word = if is > was { "grew" } else { "shrank" };
+            let years = before.date.zip(last.date).map(|(a, b)| a.days_until(b) as f64 / 365.25);
+            let (by, rate) = match years.filter(|&years| years >= 0.5) {
+                Some(years) => ((is - was).abs() / years, " a year"),
+                None => ((is - was).abs(), ""),
+            };
+            format!("{word} by {by:.digits$} {}{rate} since {since}", last.unit)
+        };
+        Some(format!("{sizes}: {told}"))
+    }
+
     /// How much of it there is, for a bill: metres of crack or square metres.
     #[must_use]
     pub fn quantity(&self) -> Option<String> {
@@ -58,6 +113,7 @@ impl Defect {
 }
 
 /// All that was found on a member, by eyes and hammers first, then by photographs, then by CT.
+/// What inspections found again is one.
 #[must_use]
 pub(crate) fn defects(
     scene: &Scene,
@@ -65,12 +121,40 @@ pub(crate) fn defects(
     photographed: &Shown,
     slices: &[SliceReading],
 ) -> Vec<Defect> {
-    let seen = survey::of_member(scene, member).filter_map(|(_, o)| seen(SURVEY, o));
+    let member_of = scene.members.iter().find(|m| m.id == member);
+    let length = member_of.map_or(1.0, |m| f64::from(m.frame.axis.length()));
+    let seen = survey::of_member(scene, member).map(|(_, o)| (SURVEY, o, None));
     let shown = photographed.observations.iter().zip(&photographed.pictures);
-    let shown = shown.filter_map(|(o, picture)| {
-        Some(Defect { picture: picture.clone(), ..self::seen(PHOTOGRAPHED, o)? })
-    });
-    seen.chain(shown).chain(grouped(slices).iter().flat_map(|group| sectioned(group))).collect()
+    let shown = shown.map(|(o, picture)| (PHOTOGRAPHED, o, picture.as_ref()));
+    let told: Vec<(&'static str, &Observation, Option<&Picture>)> = seen.chain(shown).collect();
+    let all: Vec<&Observation> = told.iter().map(|(_, o, _)| *o).collect();
+    let one = |group: Vec<usize>| {
+        let &(source, o, picture) = told.get(*group.last()?)?;
+        let defect = Defect { picture: picture.cloned(), ..self::seen(source, o)? };
+        let is_again = group.len() > 1;
+        let course =
+            if is_again { group.iter().map(|&k| Found::of(all[k])).collect() } else { Vec::new() };
+        Some(Defect { course, ..defect })
+    };
+    let found = survey::found_again(&all, length).into_iter().filter_map(one);
+    found.chain(grouped(slices).iter().flat_map(|group| sectioned(group))).collect()
+}
+
+impl Found {
+    fn of(o: &Observation) -> Self {
+        let (size, std_error, unit) = match o.shows {
+            Shows::Crack { width_mm, std_error_mm, .. } => {
+                (Some(width_mm), Some(std_error_mm), "mm")
+            }
+            Shows::Spall { area_m2, .. }
+            | Shows::Rust { area_m2 }
+            | Shows::Efflorescence { area_m2 }
+            | Shows::WetSpot { area_m2 } => (Some(area_m2), None, "m²"),
+            Shows::Sounding { hollow_m2, .. } => (Some(hollow_m2), None, "m²"),
+            _ => (None, None, ""),
+        };
+        Self { date: o.date, item: o.name.clone(), size, std_error, unit }
+    }
 }
 
 /// What an observation found; none where it is a reading of an instrument, or where nothing was.
@@ -86,6 +170,7 @@ fn seen(source: &'static str, o: &Observation) -> Option<Defect> {
         source,
         item: o.name.clone(),
         date: o.date.map(|d| d.to_string()),
+        course: Vec::new(),
         picture: None,
         photo: o.picture.clone(),
     };
@@ -139,6 +224,7 @@ fn sectioned(sections: &[&SliceReading]) -> Vec<Defect> {
         source: CT,
         item: format!("{}, {}", slice.core, slice.name),
         date: slice.drilled.and_then(|d| d.date).map(|d| d.to_string()),
+        course: Vec::new(),
         picture: None,
         photo: None,
     };
@@ -179,4 +265,54 @@ fn grouped(slices: &[SliceReading]) -> Vec<Vec<&SliceReading>> {
         }
     }
     groups
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cracked(found: &[(Option<&str>, f64)]) -> Defect {
+        let found = found.iter().map(|(date, width)| Found {
+            date: date.map(|d| d.parse().unwrap()),
+            item: String::new(),
+            size: Some(*width),
+            std_error: Some(0.05),
+            unit: "mm",
+        });
+        Defect {
+            kind: "crack across",
+            along: None,
+            angle_deg: None,
+            size: String::new(),
+            width_mm: None,
+            length_m: None,
+            area_m2: None,
+            source: SURVEY,
+            item: String::new(),
+            date: None,
+            course: found.collect(),
+            picture: None,
+            photo: None,
+        }
+    }
+
+    #[test]
+    fn a_defect_tells_its_course() {
+        let all =
+            [(Some("2016-05-03"), 0.2), (Some("2021-05-03"), 0.35), (Some("2026-05-03"), 0.6)];
+        assert_eq!(
+            cracked(&all).change().unwrap(),
+            "0.20 (2016), 0.35 (2021), 0.60 mm (2026): grew by 0.05 mm a year since 2021"
+        );
+        let same = [(Some("2026-01-02"), 0.3), (Some("2026-05-03"), 0.35)];
+        assert_eq!(
+            cracked(&same).change().unwrap(),
+            "0.30 (2026-01-02), 0.35 mm (2026-05-03): no change since 2026-01-02 beyond the error of reading"
+        );
+        assert_eq!(
+            cracked(&[(Some("2021-05-01"), 0.5), (None, 0.3)]).change().unwrap(),
+            "0.50 (2021), 0.30 mm (undated): shrank by 0.20 mm since 2021"
+        );
+        assert_eq!(cracked(&[]).change(), None);
+    }
 }

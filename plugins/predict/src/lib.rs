@@ -12,7 +12,7 @@ mod section;
 mod settings;
 
 pub use compared::{Compared, score};
-pub use defect::Defect;
+pub use defect::{Defect, Found};
 pub use error::PredictError;
 pub use foreseen::foreseen;
 pub use intrados_ct::source::Origin;

@@ -32,21 +32,21 @@ pub(crate) fn limits(
     items: &[ledger::Item],
 ) -> Vec<String> {
     let mut limits = vec![
-        "Damage is the share of strength lost in the worst zone (a tenth of the length). Of a zone without a slice of its own the others speak as far as the grading profile's correlation lengths reach, with an error that grows.".to_owned(),
-        "Slices show pores and cracks, and where they show the whole section what has fallen off and how much of its bars is left; they do not show lost stiffness, nor what lies between them. A forecast knows of loads and chlorides, not of bad workmanship; gauges feel stiffness, not strength. The error bars allow for that by what the grading profile declares.".to_owned(),
-        "The rule that turns sections into damage is the profile's, and is not part of the error bars.".to_owned(),
+        "Damage is the share of strength lost in the worst zone (a tenth of the length). Of a zone without a slice of its own the others speak as far as the grading scale's correlation lengths reach, with an error that grows.".to_owned(),
+        "Slices show pores and cracks, and where they show the whole section what has fallen off and how much of its bars is left; they do not show lost stiffness, nor what lies between them. A forecast knows of loads and chlorides, not of bad workmanship; gauges feel stiffness, not strength. The error bars allow for that by what the grading scale declares.".to_owned(),
+        "The rule that turns sections into damage is the grading scale's, and is not part of the error bars.".to_owned(),
         "Cracks that run through large voids or honeycomb, or are much narrower than a third of a pixel, are missed; a gap along a bar counts as a crack.".to_owned(),
-        "Forecasts are made on coarse elements; widths of foretold cracks are those of EN 1992-1-1, 7.3.4, where bars run along the member.".to_owned(),
+        "Forecasts are made on coarse elements; widths of cracks by a forecast are those of EN 1992-1-1, 7.3.4, where bars run along the member.".to_owned(),
     ];
     if scene.structure.bears_as_one() {
-        limits.push("Members hand loads on as an elastic frame of whole sections does: what cracks and hands its load to others, and what falls, is not foretold.".to_owned());
+        limits.push("Members hand loads on as an elastic frame of whole sections does: what cracks and hands its load to others, and what falls, is not in the forecast.".to_owned());
     }
     let silent = members.iter().filter(|m| m.damage.is_none()).count();
     if silent > 0 {
         limits.insert(
             0,
             format!(
-                "{silent} of {} members have no evidence: that is not the same as sound.",
+                "There is no evidence of {silent} of {} members: that is not the same as sound.",
                 members.len()
             ),
         );
@@ -55,7 +55,10 @@ pub(crate) fn limits(
     if unmeasured > 0 {
         limits.insert(
             0,
-            format!("Of {unmeasured} members nothing was measured: their damage is foretold only."),
+            format!(
+                "Nothing was measured on {}: what is said of them is a forecast.",
+                many(unmeasured)
+            ),
         );
     }
     let unused = items.iter().filter(|i| !i.used).count();
@@ -63,7 +66,7 @@ pub(crate) fn limits(
         limits.insert(
             0,
             format!(
-                "{unused} of {} items of evidence were not used; the ledger says why.",
+                "{unused} of {} items of evidence were not used; the list of evidence says why.",
                 items.len()
             ),
         );
@@ -88,7 +91,7 @@ pub(crate) fn limits(
     }
     let unpredicted = members.iter().filter(|m| m.damage.is_none() && m.truth.is_some()).count();
     if unpredicted > 0 {
-        limits.insert(0, format!("Of {unpredicted} members the truth is known but nothing was predicted; they are not part of the score."));
+        limits.insert(0, format!("The truth of {} is known but nothing was predicted; they are not part of the score.", many(unpredicted)));
     }
     let made = |origin: Origin| members.iter().flat_map(|m| &m.slices).any(|r| r.origin == origin);
     if made(Origin::Scanned) {
@@ -98,6 +101,11 @@ pub(crate) fn limits(
         limits.insert(0, format!("Some slices are {MARK}: pictures made from the planted truth. Their scores show that the chain works, not how it would do in the field."));
     }
     limits
+}
+
+/// So many members.
+fn many(n: usize) -> String {
+    if n == 1 { "1 member".into() } else { format!("{n} members") }
 }
 
 /// What the error bar leaves open, and what of rust is assumed or not computed.
@@ -115,19 +123,22 @@ fn limits_of_states(members: &[MemberPrediction]) -> Vec<String> {
         (
             assumed,
             format!(
-                "Rust of {assumed} members is foretold by values assumed for their exposure class, which are in predict.json; their spread is in the error."
+                "The forecast of rust in {} rests on values assumed for the exposure class, which stand on the pages of the members; their spread is in the error.",
+                many(assumed)
             ),
         ),
         (
             unknown,
             format!(
-                "Rust of bars is not computed for {unknown} members (their forecasts say why): that is not the same as none."
+                "Rust of bars is not computed for {} (the forecasts say why): that is not the same as none.",
+                many(unknown)
             ),
         ),
         (
             undecided,
             format!(
-                "Of {undecided} members the error bar leaves open which state they are in: none has a probability of {NAMED}."
+                "The error bar leaves the state of {} open: no state has a probability of {NAMED}.",
+                many(undecided)
             ),
         ),
     ];

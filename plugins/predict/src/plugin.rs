@@ -6,7 +6,7 @@ use intrados_ct::source::SliceShelf;
 use intrados_damage::{
     evidence::{AllEvidence, Evidence, Sources},
     grading::Profile,
-    verdict::{Basis, Verdict},
+    verdict::{Basis, Looked, Verdict},
     zone::{ZONES, Zones},
 };
 use intrados_scene::{
@@ -300,25 +300,30 @@ fn testify(
 fn judge(
     mut commands: Commands,
     progress: Res<Progress>,
-    members: Query<(Entity, &AllEvidence), Changed<AllEvidence>>,
+    members: Query<(Entity, &SceneIndex, &AllEvidence), Changed<AllEvidence>>,
 ) {
-    let Some(profile) = progress.profile() else { return };
-    for (entity, all) in &members {
-        match judged(all, profile) {
+    let Some(predictor) = progress.predictor() else { return };
+    for (entity, &SceneIndex(index), all) in &members {
+        let found = predictor.has_found(&progress.scene, index);
+        match judged(all, predictor.profile(), found) {
             Some(predicted) => commands.entity(entity).insert(predicted),
             None => commands.entity(entity).remove::<Predicted>(),
         };
     }
 }
 
-fn judged(all: &AllEvidence, profile: &Profile) -> Option<Predicted> {
+/// `found`: whether anything was found to be wrong with the member.
+fn judged(all: &AllEvidence, profile: &Profile, found: bool) -> Option<Predicted> {
     let evidence: Vec<&Evidence> = all.list().iter().collect();
     let whole = profile.fusion.whole(&evidence);
     let damage = whole.damage()?;
     let evidence: Vec<&Evidence> =
         evidence.into_iter().filter(|e| whole.counted.contains(e.source)).collect();
     let basis = Basis::by_zone(&evidence);
-    let verdict = Verdict::of(profile, Some(damage), &profile.cracks(&evidence), Basis::of(&basis));
+    let looked = Looked::of(profile, &evidence);
+    let looked = Looked { found: looked.found || found, ..looked };
+    let cracks = profile.cracks(&evidence);
+    let verdict = Verdict::of(profile, Some(damage), &cracks, Basis::of(&basis), looked);
     Some(Predicted {
         damage,
         zones: whole.zones,

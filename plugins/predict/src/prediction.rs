@@ -86,8 +86,12 @@ pub struct MemberPrediction {
     pub zone_basis: [Basis; ZONES],
     /// What should be done: by the profile, or to look first.
     pub advice: String,
-    /// Within how many months, by the worst state that it may be in; none: nobody says.
+    /// Within how many months, by the worst state that it may be in, or as the profile wants what
+    /// is to be inspected; none: nobody says.
     pub within_months: Option<u32>,
+    /// Whether an inspection is all that is to be done: nothing was found on it, and what is most
+    /// probable is sound.
+    pub to_inspect: bool,
     /// Damage by zone, tenths of the axis from its start; none where nothing is known.
     pub zones: Zones,
     /// The same by cause.

@@ -3,11 +3,14 @@
 
 use std::collections::BTreeMap;
 
+use glam::Vec3;
 use intrados_scene::{
-    Assembly, Member, Part, Scene,
-    structure::{Date, Project, Structure},
+    Assembly, Frame, Member, Part, Scene,
+    structure::{Date, Project},
 };
 use serde::Serialize;
+
+use crate::surface::concrete;
 
 /// The basis of a report.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
@@ -27,8 +30,11 @@ pub struct MemberBasis {
     pub id: String,
     /// m.
     pub length_m: f64,
-    /// Length, box across and volume.
+    /// Length, how wide it is across, and volume.
     pub size: String,
+    /// How wide it is across its axis, along the direction where angles begin and along that of
+    /// 90 degrees, m; none of a member without a surface.
+    pub across_m: Option<[f64; 2]>,
     /// Class.
     pub concrete: String,
     /// Bars, stirrups and tendons.
@@ -45,7 +51,7 @@ impl Basis {
     /// Of a scene.
     #[must_use]
     pub fn of(scene: &Scene) -> Self {
-        let member = |m: &Member| member(&scene.structure, m);
+        let member = |(index, m): (usize, &Member)| member(scene, index, m);
         let mut project = scene.structure.project.clone();
         if project.structure.is_empty() {
             project.structure = scene.name.clone();
@@ -54,7 +60,7 @@ impl Basis {
             .inspected
             .or_else(|| scene.structure.observations.iter().filter_map(|o| o.date).max());
         let on_earth = on_earth(scene);
-        Self { project, on_earth, members: scene.members.iter().map(member).collect() }
+        Self { project, on_earth, members: scene.members.iter().enumerate().map(member).collect() }
     }
 
     /// The day so many months after the inspection; none where nobody said when that was.
@@ -68,6 +74,16 @@ impl Basis {
     #[must_use]
     pub fn length_of(&self, id: &str) -> f64 {
         self.members.iter().find(|b| b.id == id).map_or(1.0, |b| b.length_m)
+    }
+}
+
+impl MemberBasis {
+    /// Whether all that is said of two members is the same.
+    pub(crate) fn is_built_like(&self, other: &Self) -> bool {
+        fn said(b: &MemberBasis) -> [&str; 5] {
+            [&b.size, &b.concrete, &b.steel, &b.exposure, &b.loads]
+        }
+        said(self) == said(other) && self.assumed == other.assumed
     }
 }
 
@@ -86,12 +102,30 @@ fn on_earth(scene: &Scene) -> String {
     }
 }
 
-fn member(structure: &Structure, m: &Member) -> MemberBasis {
+/// How wide points are across the axis of a frame, towards its zero and its 90 degrees, m. The box
+/// of a member in the world's axes says nothing of that, where the member does not lie along them.
+fn across(frame: Frame, points: impl Iterator<Item = Vec3>) -> Option<[f64; 2]> {
+    let ways = [frame.zero, frame.ninety()];
+    let mut reach = [[f32::INFINITY, f32::NEG_INFINITY]; 2];
+    for point in points {
+        for (way, [low, high]) in ways.iter().zip(&mut reach) {
+            let at = (point - frame.start).dot(*way);
+            (*low, *high) = (low.min(at), high.max(at));
+        }
+    }
+    let widths = reach.map(|[low, high]| f64::from(high - low));
+    widths.iter().all(|w| w.is_finite()).then_some(widths)
+}
+
+fn member(scene: &Scene, index: usize, m: &Member) -> MemberBasis {
+    let structure = &scene.structure;
     let assembly = structure.assembly_of(&m.id);
     let length_m = f64::from(m.frame.axis.length());
-    let across = m.bounds[1] - m.bounds[0];
-    let mut sides = across.to_array();
-    sides.sort_by(f32::total_cmp);
+    let across_m = across(m.frame, concrete(scene, index).into_iter().flatten());
+    let is_upright = f64::from(m.frame.axis.y.abs()) > 0.9 * length_m;
+    let long = if is_upright { "high" } else { "long" };
+    let wide = across_m
+        .map_or_else(String::new, |[a, b]| format!(", {:.2} × {:.2} m across", a.max(b), a.min(b)));
     let volume = if m.volume > 0.0 { format!(", {:.2} m³", m.volume) } else { String::new() };
     let mut assumed = Vec::new();
     if m.concrete_assumed {
@@ -108,7 +142,8 @@ fn member(structure: &Structure, m: &Member) -> MemberBasis {
     MemberBasis {
         id: m.id.clone(),
         length_m,
-        size: format!("{length_m:.2} m long, box {:.2} × {:.2} m{volume}", sides[0], sides[1]),
+        size: format!("{length_m:.2} m {long}{wide}{volume}"),
+        across_m,
         concrete: assembly.and_then(|a| a.matter.as_ref()).map_or_else(
             || m.concrete.clone(),
             |matter| format!("{}, computed as {}", matter.name, m.concrete),
@@ -145,4 +180,26 @@ fn steel(assembly: &Assembly) -> String {
 fn listed<'a>(words: impl Iterator<Item = &'a str>, nothing: &str) -> String {
     let all: Vec<&str> = words.collect();
     if all.is_empty() { nothing.to_owned() } else { all.join(", ") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A girder of .3 by .25 m that lies at 31° to the world's axes had a box of 5.16 m.
+    #[test]
+    fn a_skewed_member_is_measured_along_its_own_axes() {
+        let (sin, cos) = 31_f32.to_radians().sin_cos();
+        let axis = 10.0 * Vec3::new(cos, 0.0, sin);
+        let frame = Frame { start: Vec3::new(3.0, 1.0, -7.0), axis, zero: Vec3::Y };
+        let corners = (0..8).map(|k| {
+            let sign = |bit: i32| if k >> bit & 1 == 0 { -0.5 } else { 0.5 };
+            frame.point(sign(0) + 0.5)
+                + sign(1) * 0.25 * frame.zero
+                + sign(2) * 0.3 * frame.ninety()
+        });
+        let [up, aside] = across(frame, corners).unwrap();
+        assert!((up - 0.25).abs() < 1e-5 && (aside - 0.3).abs() < 1e-5, "{up} {aside}");
+        assert_eq!(across(frame, std::iter::empty()), None);
+    }
 }

@@ -11,6 +11,7 @@ use intrados_ct::{
 };
 use intrados_damage::{
     Evidence,
+    evidence::Cause,
     ledger::Group,
     verdict::{Basis, NAMED},
     zone::place,
@@ -22,15 +23,17 @@ use intrados_stage::Estimate;
 use intrados_survey::{SURVEY, photographed::PHOTOGRAPHED};
 
 use super::{
-    Document, Provenance, svg,
+    Document, Provenance,
+    basis::MemberBasis,
+    svg,
     visibility::{
         SEEN_FROM,
         photograph::Sensor,
         radiograph::{SLICES, VIEWS},
     },
     words::{
-        NOTHING, bad_probability, due, finding, level, matters, metres, plus_minus, within, word,
-        worse_half,
+        NOTHING, bad_probability, due, files, finding, level, many, matters, metres, plus_minus,
+        state, within, word, worse_half,
     },
 };
 
@@ -97,7 +100,6 @@ struct Says<'a> {
     source: &'a str,
     cause: &'static str,
     worst: String,
-    blind: String,
     basis: &'a str,
 }
 
@@ -132,6 +134,19 @@ struct Section<'a> {
     worst: bool,
     cells: [String; 10],
     truth: [String; 4],
+}
+
+/// Members that share a line.
+struct Alike<'a> {
+    first: &'a MemberPrediction,
+    names: Vec<&'a str>,
+}
+
+/// What became of the evidence of a member.
+struct Items<'a> {
+    member: &'a str,
+    /// Source, items, verdict, and whether they are used.
+    rows: Vec<(&'a str, String, String, bool)>,
 }
 
 /// A row of the first page.
@@ -179,11 +194,12 @@ impl<'a> Page<'a> {
         worse_half(&self.p.profile).iter().map(|s| s.name.as_str()).collect::<Vec<_>>().join(" or ")
     }
 
-    /// The worst members, and what is the matter with each.
+    /// The worst members, and what is the matter with each; but not those that are only to be
+    /// inspected.
     fn findings(&self) -> Vec<Finding<'a>> {
         let likely = |m: &MemberPrediction| bad_probability(m, &self.p.profile);
         let mut members: Vec<&MemberPrediction> =
-            self.p.members.iter().filter(|m| self.has_sheet(m)).collect();
+            self.p.members.iter().filter(|m| self.has_sheet(m) && !m.to_inspect).collect();
         members.sort_by(|a, b| {
             let key = |m: &MemberPrediction| (m.damage.unwrap_or(0.0), likely(m));
             key(b).0.total_cmp(&key(a).0).then(key(b).1.total_cmp(&key(a).1))
@@ -209,7 +225,48 @@ impl<'a> Page<'a> {
         matters(m)
     }
 
-    /// The members of which something is foretold, and too little for a sheet.
+    /// The members that are only to be inspected, and on which something was measured.
+    fn to_inspect(&self) -> Vec<&'a MemberPrediction> {
+        self.p.members.iter().filter(|m| m.to_inspect && self.has_sheet(m)).collect()
+    }
+
+    /// When to inspect.
+    fn inspection_due(&self) -> String {
+        let one = self.p.members.iter().find(|m| m.to_inspect);
+        one.map_or_else(|| NOTHING.into(), |m| self.due(m))
+    }
+
+    fn members(&self, n: usize) -> String {
+        many(n, "member")
+    }
+
+    fn files(&self, text: &str) -> String {
+        files(text)
+    }
+
+    /// Members without a sheet, those of one damage and state in a line.
+    fn alike(&self) -> Vec<Alike<'a>> {
+        self.shared(&|m| format!("{} {}", self.damage(m), m.state))
+    }
+
+    /// Members without a sheet, those with the same forecast in a line.
+    fn alike_by_basis(&self) -> Vec<Alike<'a>> {
+        self.shared(&|m| m.evidence.values().map(|e| e.basis.as_str()).collect())
+    }
+
+    fn shared(&self, key: &dyn Fn(&MemberPrediction) -> String) -> Vec<Alike<'a>> {
+        let mut lines: Vec<(String, Alike)> = Vec::new();
+        for m in self.without_sheet() {
+            let own = key(m);
+            match lines.iter_mut().find(|(key, _)| *key == own) {
+                Some((_, line)) => line.names.push(&m.name),
+                None => lines.push((own, Alike { first: m, names: vec![&m.name] })),
+            }
+        }
+        lines.into_iter().map(|(_, line)| line).collect()
+    }
+
+    /// The members of which a forecast says little and nothing else is known: no sheet.
     fn without_sheet(&self) -> Vec<&'a MemberPrediction> {
         self.p.members.iter().filter(|m| m.damage.is_some() && !self.has_sheet(m)).collect()
     }
@@ -218,8 +275,22 @@ impl<'a> Page<'a> {
         within(*months)
     }
 
+    /// A month does not break at its hyphen.
     fn due(&self, m: &MemberPrediction) -> String {
-        due(m, &self.document.basis)
+        due(m, &self.document.basis).replace('-', "\u{2011}")
+    }
+
+    /// What members rest on, those that are built alike in a line.
+    fn built_alike(&self) -> Vec<(String, &'a MemberBasis)> {
+        let mut lines: Vec<(Vec<&str>, &MemberBasis)> = Vec::new();
+        for b in &self.document.basis.members {
+            let name = self.p.name_of(&b.id);
+            match lines.iter_mut().find(|(_, first)| first.is_built_like(b)) {
+                Some((names, _)) => names.push(name),
+                None => lines.push((vec![name], b)),
+            }
+        }
+        lines.into_iter().map(|(names, b)| (names.join(", "), b)).collect()
     }
 
     /// Its defects on its surface, unrolled.
@@ -245,10 +316,6 @@ impl<'a> Page<'a> {
 
     fn along(&self, m: &MemberPrediction, defect: &Defect) -> String {
         defect.along.map_or_else(|| NOTHING.into(), |along| metres(along, self.length(m)))
-    }
-
-    fn short_hash(&self) -> String {
-        self.p.scene_hash.chars().take(12).collect()
     }
 
     /// Whether any slice was drawn and not scanned.
@@ -277,10 +344,10 @@ impl<'a> Page<'a> {
         let mut counts: Vec<(usize, String)> = states
             .map(|s| (count(&|m| m.state == s.name), format!("{}, measured", s.name)))
             .collect();
-        counts.push((count(&open), "measured, state left open by the error bar".into()));
+        counts.push((count(&open), "measured, state not settled".into()));
         counts.push((
             count(&|m| m.basis == Basis::Foretold),
-            "foretold only, nothing measured".into(),
+            "forecast only, nothing measured".into(),
         ));
         counts.push((
             count(&|m| m.damage.is_none()),
@@ -300,8 +367,45 @@ impl<'a> Page<'a> {
         names.join(", ")
     }
 
-    fn groups(&self) -> Vec<Group<'a>> {
-        Group::all(&self.p.items)
+    /// What became of every item, member by member; but of members with their forecast alone.
+    fn ledger(&self) -> Vec<Items<'a>> {
+        let mut all: Vec<(&str, Items)> = Vec::new();
+        for group in Group::all(&self.p.items) {
+            let first = group.first();
+            let member = self.p.name_of(&first.member);
+            let life = format!("the life of {member}");
+            let name = group.name();
+            let name = if name == life { "life of the member".into() } else { files(&name) };
+            let row = (word(first.source), name, files(&first.verdict()), first.used);
+            match all.last_mut().filter(|(id, _)| *id == first.member) {
+                Some((_, items)) => items.rows.push(row),
+                None => all.push((&first.member, Items { member, rows: vec![row] })),
+            }
+        }
+        let is_forecast_alone = |items: &Items| matches!(items.rows.as_slice(), [(source, _, _, true)] if *source == FORECAST);
+        let (alone, mut rest): (Vec<Items>, Vec<Items>) =
+            all.into_iter().map(|(_, items)| items).partition(is_forecast_alone);
+        let names: Vec<&str> = alone.iter().map(|items| items.member).collect();
+        if !names.is_empty() {
+            let names = format!("lives of {}: {}", many(names.len(), "member"), names.join(", "));
+            let row = (FORECAST, names, "used".to_owned(), true);
+            rest.push(Items { member: "Forecast alone", rows: vec![row] });
+        }
+        rest
+    }
+
+    /// What sources cannot show of each cause: source, cause and standard error.
+    fn blindness(&self) -> Vec<(String, &'static str, String)> {
+        let one = |(source, cause, error): &(String, Cause, f64)| {
+            (word(source).to_owned(), cause.name(), format!("{error:.2}"))
+        };
+        self.p.profile.fusion.blindness.iter().map(one).collect()
+    }
+
+    /// Shares of its length that are to be expected in each state, from the best.
+    fn shares(&self, m: &MemberPrediction) -> Vec<String> {
+        let share = |name: &str| Some(format!("{:.0} % {name}", 100.0 * m.states.get(name)?));
+        self.p.profile.states.iter().filter_map(|s| share(&s.name)).collect()
     }
 
     fn kind(&self, m: &MemberPrediction) -> String {
@@ -344,10 +448,14 @@ impl<'a> Page<'a> {
         svg::histogram(diameters)
     }
 
-    /// A member's state: as bad as it may be, dashed where it is only foretold.
+    /// A member's state: as bad as it may be, dashed where it is a forecast.
     fn chip(&self, m: &MemberPrediction) -> String {
         let last = m.state_probability.len();
-        chip(&m.state, m.state_run.map(|[_, worst]| level(worst, last)), m.basis == Basis::Foretold)
+        chip(
+            &state(m),
+            m.state_run.map(|[_, worst]| level(worst, last)),
+            m.basis == Basis::Foretold,
+        )
     }
 
     fn state_chip(&self, state: &str) -> String {
@@ -394,7 +502,6 @@ impl<'a> Page<'a> {
                     worst: zones
                         .worst()
                         .map_or_else(|| NOTHING.into(), |(_, worst)| plus_minus(worst)),
-                    blind: format!("{:.2}", self.p.profile.fusion.blind(source, *cause)),
                     basis: if k == 0 { &e.basis } else { "" },
                 });
             }
@@ -422,22 +529,36 @@ impl<'a> Page<'a> {
     fn course(&self, m: &MemberPrediction) -> Vec<(String, String, String)> {
         let one = |p: svg::Point| {
             let [value, error] = [p.lost.value, p.lost.std_error].map(|x| 100.0 * x);
-            let when = p.date.unwrap_or_else(|| "foretold".into());
+            let when = p.date.unwrap_or_else(|| "forecast".into());
             (when, format!("{:.0}", p.age_years), format!("{value:.1} ± {error:.1}"))
         };
-        course(m).into_iter().map(one).collect()
+        let mut rows: Vec<_> = course(m).into_iter().map(one).collect();
+        // The last point lies years ahead; one before that without a date is of today.
+        if let [.., (now, ..), _] = rows.as_mut_slice()
+            && now == "forecast"
+        {
+            "now".clone_into(now);
+        }
+        rows
     }
 
     fn course_plot(&self, m: &MemberPrediction) -> String {
         svg::course(&course(m))
     }
 
-    /// The share of bars' section that was taken for lost before the last inspection, %.
+    /// What the last inspection has changed of the share of bars' section that is taken for lost.
     fn before_the_last(&self, m: &MemberPrediction) -> Option<String> {
-        let before = surveyed(m)?.details.get("rust_before_the_last_inspection")?;
-        let [value, error] =
-            [before["value"].as_f64()?, before["std_error"].as_f64()?].map(|x| 100.0 * x);
-        Some(format!("{value:.1} ± {error:.1}"))
+        let evidence = surveyed(m)?;
+        let before = evidence.details.get("rust_before_the_last_inspection")?;
+        let before =
+            Estimate { value: before["value"].as_f64()?, std_error: before["std_error"].as_f64()? };
+        let (_, now) = evidence.zones.get(&Cause::Steel)?.worst()?;
+        let [then, now] =
+            [before, now].map(|e| format!("{:.1} ± {:.1} %", 100.0 * e.value, 100.0 * e.std_error));
+        Some(format!(
+            "From the earlier inspections alone, {then} of the bars' section would be expected to \
+             be lost by now; with the last inspection it is {now}."
+        ))
     }
 
     /// The slices whose pictures were kept, worst first.
@@ -514,8 +635,8 @@ impl<'a> Page<'a> {
         let number = |v: Option<u64>| v.map_or_else(|| NOTHING.into(), |v| v.to_string());
         vec![
             ("Program", format!("Intrados {}", self.p.version)),
-            ("Scene", self.p.scene.clone()),
-            ("Hash of the scene and its files", self.p.scene_hash.clone()),
+            ("Scene file", self.p.scene.clone()),
+            ("Hash of that and its files", self.p.scene_hash.clone()),
             ("Command", self.provenance.command.clone()),
             ("Seed of the pictures", number(self.provenance.seed)),
             ("Samples a pixel of the pictures", number(self.provenance.samples)),
@@ -630,10 +751,10 @@ fn unmarked(name: &str) -> &str {
         .unwrap_or(name)
 }
 
-fn chip(state: &str, level: Option<usize>, foretold: bool) -> String {
+fn chip(state: &str, level: Option<usize>, is_forecast: bool) -> String {
     let (look, sign) = match level {
         None => ("sx".to_owned(), NOTHING),
-        Some(level) if foretold => (format!("s{level} foretold"), "◌"),
+        Some(level) if is_forecast => (format!("s{level} forecast"), "◌"),
         Some(level) => (format!("s{level}"), SIGNS[level]),
     };
     Chip { look, sign, state }.to_string()

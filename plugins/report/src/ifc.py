@@ -12,6 +12,9 @@ import re
 import sys
 
 OLDEST = (0, 8)
+# An IfcLabel has at most 255 characters.
+TEXTS = ("Advice", "Defects")
+LABEL = 255
 
 
 def say(**words):
@@ -58,6 +61,10 @@ def main(path, folder):
             old = there.get(name)
             if old:
                 sets.remove_pset(model, product=element, pset=model.by_id(old["id"]))
+            properties = {
+                key: model.create_entity("IfcText", value) if isinstance(value, str) and (key in TEXTS or len(value) > LABEL) else value
+                for key, value in properties.items()
+            }
             new = sets.add_pset(model, product=element, name=name)
             sets.edit_pset(model, pset=new, properties=properties)
     model.write(os.path.join(folder, "model.ifc"))

@@ -18,6 +18,8 @@ use intrados_stage::{
 };
 use serde_json::{Map, Value, json};
 
+use crate::words::{state, word};
+
 /// What puts them there, which is ours.
 const SCRIPT: &str = include_str!("ifc.py");
 /// Longest model that is taken back, bytes.
@@ -89,7 +91,7 @@ fn properties(m: &MemberPrediction, prediction: &Prediction, date: &str) -> Valu
             all.insert(name.into(), value);
         }
     };
-    put("State", json!(m.state));
+    put("State", json!(state(m)));
     put("Damage", json!(m.damage));
     put("DamageStandardError", json!(m.damage_std_error));
     for (state, probability) in &m.state_probability {
@@ -99,7 +101,7 @@ fn properties(m: &MemberPrediction, prediction: &Prediction, date: &str) -> Valu
     put("WithinMonths", json!(m.within_months));
     put("WorstZoneFromStartInTenths", json!(m.worst_zone));
     put("CrackWidthInMillimetres", json!(m.crack_check.as_ref().map(|c| c.width_mm)));
-    let sources: Vec<&str> = m.evidence.keys().copied().collect();
+    let sources: Vec<&str> = m.evidence.keys().map(|source| word(source)).collect();
     put("Evidence", json!(if sources.is_empty() { "none".into() } else { sources.join(", ") }));
     put("EvidenceContradictsItself", json!(m.conflict));
     let defects = m.defects.iter().map(|d| format!("{} {}", d.kind, d.size).trim().to_owned());

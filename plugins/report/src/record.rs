@@ -21,6 +21,7 @@ use crate::{
         photograph::{Sensor, photograph},
         radiograph::radiograph,
     },
+    words::state,
 };
 
 /// Pictures of members in a report; the worst ones.
@@ -128,7 +129,7 @@ impl Record {
         let scene = &lit.scene;
         let overview =
             scene.cameras.first().cloned().unwrap_or_else(|| Camera::overview(scene.bounds()));
-        // A segment that is foretold to be sound needs no portrait.
+        // A segment that nobody expects to be damaged needs no portrait.
         let shows = |m: &MemberPrediction| {
             m.evidence.values().any(|e| e.measured)
                 || m.damage.is_some_and(|d| d >= prediction.profile.damaged_from())
@@ -138,13 +139,17 @@ impl Record {
         members.sort_by(|(_, a), (_, b)| {
             b.damage.partial_cmp(&a.damage).unwrap_or(std::cmp::Ordering::Equal)
         });
+        let structure = match scene.structure.project.structure.as_str() {
+            "" => &scene.name,
+            named => named,
+        };
         let mut shots =
-            vec![(lit, overview.clone(), format!("{}, camera {}", scene.name, overview.name))];
+            vec![(lit, overview.clone(), format!("{structure}, camera {}", overview.name))];
         let known = prediction.members.iter().any(|m| m.damage.is_some());
         let painted =
             if known { Some(painted(scene, prediction, &job.part(0.0, 0.0))?) } else { None };
         if let Some(painted) = &painted {
-            const LEGEND: &str = "violet: sound (d = 0), green: half of the strength lost, yellow: all of it; greyed: foretold, nothing measured there; grey: nothing known";
+            const LEGEND: &str = "violet: sound, green: half of the strength lost, yellow: all of it; greyed: forecast only, nothing measured there; grey: nothing known";
             shots.push((
                 painted,
                 overview.clone(),
@@ -156,7 +161,7 @@ impl Record {
                     shots.push((
                         painted,
                         camera,
-                        format!("{}: {}, coloured by damage", member.name, member.state),
+                        format!("{}: {}, coloured by damage", member.name, state(member)),
                     ));
                 }
             }

@@ -29,6 +29,17 @@ pub struct Facet {
     pub zone: usize,
 }
 
+/// The concrete's triangles of a member, in the world.
+pub(crate) fn concrete(scene: &Scene, member: usize) -> Vec<[Vec3; 3]> {
+    let own = scene.objects.iter().filter(|o| o.member == Some(member) && o.part == Part::Concrete);
+    own.filter_map(|o| Some((o, scene.meshes.get(o.mesh)?)))
+        .flat_map(|(o, mesh)| {
+            let place = |t| mesh.corners(t).map(|p| o.transform.transform_point3(p));
+            (0..mesh.triangles.len()).map(place)
+        })
+        .collect()
+}
+
 /// The concrete surfaces of all members, cut into zones.
 #[must_use]
 pub fn facets(scene: &Scene) -> Vec<Facet> {

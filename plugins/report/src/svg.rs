@@ -9,6 +9,8 @@ use intrados_damage::{
 use intrados_predict::MemberPrediction;
 use intrados_stage::Estimate;
 
+use crate::words::word;
+
 /// Diameters of pores in classes of equal ratio (√2), with axes.
 pub(super) fn histogram(diameters: &[f64]) -> String {
     let Some(smallest) = diameters.iter().copied().filter(|d| *d > 0.0).reduce(f64::min) else {
@@ -100,7 +102,7 @@ pub(super) fn gauge(
     svg + "</svg>"
 }
 
-/// What is only foretold is hollow.
+/// What is a forecast alone is hollow.
 fn fill(basis: Basis) -> &'static str {
     if basis == Basis::Foretold { "hollow" } else { "fill" }
 }
@@ -160,8 +162,13 @@ pub(super) fn profile(m: &MemberPrediction) -> String {
             svg += &mark(x(middle(zone)) + 0.5 * shift * step, y(reading.value));
         }
         let at = left + 8.0 + 96.0 * k as f64;
-        let _ =
-            write!(svg, "{}<text x=\"{:.1}\" y=\"11\">{source}</text>", mark(at, 7.0), at + 8.0);
+        let _ = write!(
+            svg,
+            "{}<text x=\"{:.1}\" y=\"11\">{}</text>",
+            mark(at, 7.0),
+            at + 8.0,
+            word(source)
+        );
     }
     for (zone, &truth) in
         m.truth.iter().filter_map(|t| t.zones.as_ref()).flat_map(|zones| zones.iter().enumerate())
@@ -194,7 +201,7 @@ pub(super) fn profile(m: &MemberPrediction) -> String {
     }
     let _ = write!(
         svg,
-        "<line x1=\"{left}\" x2=\"{w}\" y1=\"{0:.1}\" y2=\"{0:.1}\" class=\"axis\"/><text x=\"{1:.0}\" y=\"{2:.0}\" text-anchor=\"middle\">place on the axis from its start [%]</text><text x=\"12\" y=\"{3:.0}\" text-anchor=\"middle\" transform=\"rotate(-90 12 {3:.0})\">damage d</text></svg>",
+        "<line x1=\"{left}\" x2=\"{w}\" y1=\"{0:.1}\" y2=\"{0:.1}\" class=\"axis\"/><text x=\"{1:.0}\" y=\"{2:.0}\" text-anchor=\"middle\">place on the axis from its start [%]</text><text x=\"12\" y=\"{3:.0}\" text-anchor=\"middle\" transform=\"rotate(-90 12 {3:.0})\">damage</text></svg>",
         y(0.0),
         0.5 * (w + left),
         h - 4.0,
@@ -206,14 +213,14 @@ pub(super) fn profile(m: &MemberPrediction) -> String {
 /// What is lost of the bars at an age.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Point {
-    /// Of an inspection; none: foretold.
+    /// Of an inspection; none: of a forecast, or of nobody knows when.
     pub(super) date: Option<String>,
     pub(super) age_years: f64,
     /// Share of the bars' section.
     pub(super) lost: Estimate,
 }
 
-/// The course of rust over the years with its 95 % intervals; what is foretold is hollow.
+/// The course of rust over the years with its 95 % intervals; the forecast is hollow.
 pub(super) fn course(points: &[Point]) -> String {
     let (w, h, left, bottom) = (440.0, 150.0, 44.0, 34.0);
     let ages = points.iter().map(|p| p.age_years);
@@ -353,29 +360,30 @@ pub(super) fn map(m: &MemberPrediction, length: f64) -> String {
             _ if defect.area_m2.is_none() => [half, (0.5 * long).clamp(6.0, 40.0)],
             _ => [half.max(0.5 * side).max(4.0), (0.5 * side).clamp(4.0, 40.0)],
         };
-        // What goes round from 360° to 0° is cut there.
+        // What goes round from 360° to 0° is cut there, and the member ends at its ends.
         let [low, high] = [(middle[1] - dy).max(top), (middle[1] + dy).min(beneath + 6.0)];
+        let [first, last] = [(middle[0] - dx).max(left), (middle[0] + dx).min(right)];
         let _ = match defect.area_m2 {
             Some(_) => write!(
                 svg,
                 "<rect x=\"{:.1}\" y=\"{low:.1}\" width=\"{:.1}\" height=\"{:.1}\" class=\"area\"/>",
-                middle[0] - dx,
-                2.0 * dx,
+                first,
+                (last - first).max(2.0),
                 (high - low).max(2.0)
             ),
             None => write!(
                 svg,
                 "<line x1=\"{:.1}\" y1=\"{:.1}\" x2=\"{:.1}\" y2=\"{:.1}\" class=\"crack\"/>",
-                middle[0] - dx,
+                first,
                 middle[1] + dy,
-                middle[0] + dx,
+                last,
                 middle[1] - dy
             ),
         };
         let _ = write!(
             svg,
             "<text x=\"{:.1}\" y=\"{:.1}\">{}</text>",
-            middle[0] + dx + 3.0,
+            (last + 3.0).min(right - 4.0),
             middle[1] + 4.0,
             number + 1
         );

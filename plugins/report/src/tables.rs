@@ -231,6 +231,7 @@ pub fn defects_csv(prediction: &Prediction) -> String {
         "source",
         "item",
         "date",
+        "course",
     ]);
     for (m, d) in prediction.members.iter().flat_map(|m| m.defects.iter().map(move |d| (m, d))) {
         table.row(&[
@@ -247,6 +248,7 @@ pub fn defects_csv(prediction: &Prediction) -> String {
             d.source.to_owned(),
             d.item.clone(),
             d.date.clone().unwrap_or_default(),
+            d.change().unwrap_or_default(),
         ]);
     }
     table.text()

@@ -1,27 +1,31 @@
 //! What every file of a report says of a member in the same words.
 
-use intrados_damage::grading::{Profile, State};
+use intrados_damage::{
+    evidence::called,
+    grading::{Profile, State},
+    verdict::Basis,
+};
 use intrados_predict::{Defect, MemberPrediction};
 use intrados_stage::Estimate;
 
-use crate::basis::Basis;
+use crate::basis;
 
 /// Where there is nothing to say.
 pub(crate) const NOTHING: &str = "–";
 
-/// Damage that is foretold, and less than which is worth no line of its own.
+/// Damage by a forecast, less than which is worth no line of its own.
 const LITTLE: f64 = 0.02;
 
 /// Whether a member is worth a line of its own: something was measured or found on it, its truth is
-/// known, or damage is foretold.
+/// known, or the forecast expects damage.
 pub(crate) fn matters(m: &MemberPrediction) -> bool {
     let is_measured = m.evidence.values().any(|e| e.measured);
     m.damage.is_some_and(|d| d >= LITTLE || is_measured || m.truth.is_some())
         || !m.defects.is_empty()
 }
 
-/// What is the matter with a member, in few words: the defects that were found, or what is
-/// foretold of it.
+/// What is the matter with a member, in few words: the defects that were found, or what is lost by
+/// the rest of its evidence.
 pub(crate) fn finding(m: &MemberPrediction) -> String {
     let mut told: Vec<String> = m.defects.iter().take(3).map(defect).collect();
     if m.defects.len() > told.len() {
@@ -33,7 +37,11 @@ pub(crate) fn finding(m: &MemberPrediction) -> String {
         let most = causes.max_by(|a, b| a.1.value.total_cmp(&b.1.value));
         let sources: Vec<&str> = m.evidence.keys().map(|source| word(source)).collect();
         let what = most.map_or("damage", |(cause, _)| cause.name());
-        told.push(format!("loss of {what}, by {}", sources.join(", ")));
+        told.push(if m.to_inspect {
+            format!("nothing found by {}", sources.join(", "))
+        } else {
+            format!("loss of {what}, by {}", sources.join(", "))
+        });
     }
     told.join("; ")
 }
@@ -42,20 +50,50 @@ pub(crate) fn finding(m: &MemberPrediction) -> String {
 pub(crate) fn defect(d: &Defect) -> String {
     let size = if d.size.is_empty() { String::new() } else { format!(", {}", d.size) };
     let quantity = d.quantity().map_or_else(String::new, |q| format!(", {q}"));
-    format!("{}{size}{quantity}", d.kind)
+    let change = d.change().map_or_else(String::new, |c| format!(" [{c}]"));
+    format!("{}{size}{quantity}{change}", d.kind)
+}
+
+/// A member's state, as an owner reads it.
+pub(crate) fn state(m: &MemberPrediction) -> String {
+    match m.state.strip_prefix("foretold ") {
+        Some(state) if m.basis == Basis::Foretold => format!("forecast: {state}"),
+        _ => m.state.clone(),
+    }
+}
+
+/// A text in which files stand without the folders that they lie in.
+pub(crate) fn files(text: &str) -> String {
+    let is_file = |name: &str| {
+        name.rsplit_once('.').is_some_and(|(_, end)| {
+            (2..=5).contains(&end.len()) && end.chars().all(|c| c.is_ascii_alphanumeric())
+        })
+    };
+    let one = |word: &str| {
+        let kept = word.trim_end_matches([',', ';', ':', ')']);
+        match kept.rsplit_once(['/', '\\']) {
+            Some((_, name)) if is_file(name) => format!("{name}{}", &word[kept.len()..]),
+            // A folder whose name goes on after a blank.
+            Some((folders, _)) if folders.contains('/') && kept.starts_with('/') => String::new(),
+            _ => word.to_owned(),
+        }
+    };
+    let words: Vec<String> = text.split(' ').map(one).filter(|word| !word.is_empty()).collect();
+    words.join(" ")
+}
+
+/// So many of something, in the right number.
+pub(crate) fn many(n: usize, one: &str) -> String {
+    if n == 1 { format!("1 {one}") } else { format!("{n} {one}s") }
 }
 
 /// A source of evidence, in an engineer's word.
 pub(crate) fn word(source: &str) -> &str {
-    match source {
-        "ct" => "CT",
-        "gauges" => "strain gauges",
-        other => other,
-    }
+    called(source)
 }
 
 /// When something should be done about a member: from the day of the inspection on.
-pub(crate) fn due(m: &MemberPrediction, basis: &Basis) -> String {
+pub(crate) fn due(m: &MemberPrediction, basis: &basis::Basis) -> String {
     let within = within(m.within_months);
     match m.within_months.filter(|&months| months > 0) {
         None => within,
@@ -63,7 +101,7 @@ pub(crate) fn due(m: &MemberPrediction, basis: &Basis) -> String {
             None => format!("within {within}"),
             Some(date) => {
                 let until = date.to_string();
-                format!("within {within}: until {}", until.get(..7).unwrap_or(&until))
+                format!("within {within}, by {}", until.get(..7).unwrap_or(&until))
             }
         },
     }
@@ -74,7 +112,7 @@ pub(crate) fn within(months: Option<u32>) -> String {
     match months {
         None => NOTHING.into(),
         Some(0) => "at once".into(),
-        Some(n) => format!("{n} months"),
+        Some(n) => many(n as usize, "month"),
     }
 }
 
@@ -105,4 +143,24 @@ pub(crate) fn level(rank: usize, states: usize) -> usize {
 /// A value with its standard error.
 pub(crate) fn plus_minus(r: Estimate) -> String {
     format!("{:.2} ± {:.2}", r.value, r.std_error)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_stand_without_their_folders() {
+        assert_eq!(
+            files("core 1, bridge/evidence/3kDa_core_1/a.tif … core 1, /tmp/x/b.mha, across x (8)"),
+            "core 1, a.tif … core 1, b.mha, across x (8)"
+        );
+        let as_it_is = "pier / foundation of C30/37, 9.8e-11 m²/s, w/c 0.55";
+        assert_eq!(files(as_it_is), as_it_is);
+    }
+
+    #[test]
+    fn one_is_not_many() {
+        assert_eq!([many(1, "member"), many(2, "member")], ["1 member", "2 members"]);
+    }
 }

@@ -7,6 +7,7 @@ use std::{
     io::{Cursor, Read},
 };
 
+use intrados_ct::Picture;
 use intrados_damage::Sources;
 use intrados_forecast as forecast;
 use intrados_predict::{PredictSettings, Prediction, predict};
@@ -208,7 +209,7 @@ fn every_defect_is_a_topic_and_so_is_a_member_that_may_be_bad_though_none_was_fo
         for line in [
             "Place: 1.50 m of 3.00 m along the axis",
             "Side: 90° about the axis",
-            "Told by: survey, crack <a>, 2026-05-02",
+            "Source: survey, crack <a>, 2026-05-02",
             &format!("To do: {}", pier.advice),
         ] {
             assert!(crack.description.contains(line), "{line}: {}", crack.description);
@@ -260,4 +261,65 @@ fn the_report_comes_with_its_topics_and_names_them() {
     let again = bcf(&scene, prediction, basis, &provenance.date, Version::default()).unwrap();
     assert!(bytes == again, "{} and {} bytes", bytes.len(), again.len());
     assert!(document.files.iter().any(|file| file.ends_with("damage.bcf")));
+}
+
+/// A program that lists topics shows what each looks like.
+#[test]
+fn a_defect_with_a_photograph_has_a_snapshot() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let grey = Picture { width: 8, height: 6, rgb: vec![90; 144], caption: String::new() };
+    std::fs::write(at("crack.png"), grey.png().unwrap()).unwrap();
+    std::fs::write(at("scene.ron"), SCENE).unwrap();
+    let evidence = EVIDENCE.replace("along: 0.5,", "along: 0.5, picture: \"crack.png\",");
+    std::fs::write(at("evidence.ron"), evidence).unwrap();
+    let scene = Scene::load(&at("scene.ron"), &Job::default()).unwrap();
+    let settings = PredictSettings { forecast: None, ..PredictSettings::default() };
+    let prediction = predict(&scene, settings, &Sources::default(), &Job::default()).unwrap();
+    let basis = Basis::of(&scene);
+    for version in [Version::V2_1, Version::V3_0] {
+        let bytes = bcf(&scene, &prediction, &basis, "2026-05-04 14:20 UTC", version).unwrap();
+        let mut archive = ZipArchive::new(Cursor::new(bytes)).unwrap();
+        let names: Vec<String> =
+            archive.file_names().map(|name| name.unwrap().into_owned()).collect();
+        let shown: Vec<&String> = names.iter().filter(|n| n.ends_with("/snapshot.png")).collect();
+        let [snapshot] = shown[..] else { panic!("{names:?}") };
+        let mut png = Vec::new();
+        archive.by_name(snapshot).unwrap().read_to_end(&mut png).unwrap();
+        assert_eq!(png[1..4], *b"PNG");
+        let named = |folder: &str, archive: &mut ZipArchive<Cursor<Vec<u8>>>| {
+            let mut text = String::new();
+            let mut file = archive.by_name(&format!("{folder}/markup.bcf")).unwrap();
+            file.read_to_string(&mut text).unwrap();
+            text.contains("<Snapshot>snapshot.png</Snapshot>")
+        };
+        for name in names.iter().filter(|n| n.ends_with("/markup.bcf")) {
+            let folder = name.trim_end_matches("/markup.bcf");
+            assert_eq!(named(folder, &mut archive), snapshot.starts_with(folder));
+        }
+    }
+}
+
+/// Nobody looked at the post's neighbour without salt: that is no high priority.
+#[test]
+fn what_is_to_be_inspected_is_of_normal_priority() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    std::fs::write(at("scene.ron"), SCENE).unwrap();
+    let seen = r#"(schema: "intrados.evidence/1", items: [
+        (member: "2O2Fr$t4X7Zf8NOew3FLOH", name: "a look", along: (0.0, 0.5), shows: Intact),
+    ])"#;
+    std::fs::write(at("evidence.ron"), seen).unwrap();
+    let scene = Scene::load(&at("scene.ron"), &Job::default()).unwrap();
+    let settings = PredictSettings { forecast: None, ..PredictSettings::default() };
+    let prediction = predict(&scene, settings, &Sources::default(), &Job::default()).unwrap();
+    let pier = &prediction.members[0];
+    assert!(pier.to_inspect && pier.state_run.unwrap()[1] >= 2, "{pier:?}");
+    let basis = Basis::of(&scene);
+    let bytes = bcf(&scene, &prediction, &basis, "", Version::V2_1).unwrap();
+    let topics = topics(&unpacked(&bytes), Version::V2_1);
+    let [(topic, _)] = topics.values().collect::<Vec<_>>()[..] else { panic!("one topic") };
+    assert_eq!(topic.priority.as_deref(), Some("Medium"));
+    assert!(topic.title.contains("nothing found") && topic.description.contains("Inspect:"));
+    assert!(!topic.description.contains("as poor"), "{}", topic.description);
 }

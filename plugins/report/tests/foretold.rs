@@ -38,7 +38,7 @@ fn salt_without_numbers_is_assumed_with_its_spread() {
     assert_eq!(member.basis, Basis::Foretold);
     assert!(member.state.starts_with("foretold between"), "{}", member.state);
     assert!(
-        member.advice.starts_with("Look first") && !member.advice.contains("No action"),
+        member.advice.starts_with("Inspect") && !member.advice.contains("No action"),
         "{}",
         member.advice
     );
@@ -66,12 +66,13 @@ fn salt_without_numbers_is_assumed_with_its_spread() {
     for text in [
         "Assumed, not measured",
         "fib Bulletin 34",
-        "foretold only, nothing measured",
+        "forecast only, nothing measured",
         "no slices were read",
     ] {
         assert!(read("report.html").contains(text), "{text}");
     }
     assert!(!read("report.html").contains("Sauvola"));
+    assert!(!read("report.html").contains("foretold"));
     assert!(
         read("members.csv").contains(",foretold,")
             && read("members.csv").contains("assumed by exposure class")
@@ -100,7 +101,7 @@ fn what_is_not_computed_is_not_nothing() {
             && evidence.details["rust"]["why_not"].as_str().unwrap().contains("XD2")
     );
     assert!(
-        prediction.limits.iter().any(|l| l.contains("not computed for 1 members")),
+        prediction.limits.iter().any(|l| l.contains("not computed for 1 member ")),
         "{:?}",
         prediction.limits
     );

@@ -212,12 +212,17 @@ fn every_kind_of_evidence_on_every_kind_of_member_ends_once() {
         let unfelt =
             if member == "COL_import" { "nothing is known of the bars" } else { "tunnel linings" };
         let why = |of_parametric| if parametric { of_parametric } else { Some(unfelt) };
-        ends(member, "gauges", &format!("readings[{}]", 3 * m), why(Some("names no load test")));
-        ends(member, "gauges", &format!("readings[{}]", 3 * m + 1), why(Some("acts on")));
-        ends(member, "gauges", &format!("readings[{}]", 3 * m + 2), why(None));
+        ends(
+            member,
+            "gauges",
+            &format!("(reading {})", 3 * m + 1),
+            why(Some("names no load test")),
+        );
+        ends(member, "gauges", &format!("(reading {})", 3 * m + 2), why(Some("acts on")));
+        ends(member, "gauges", &format!("(reading {})", 3 * m + 3), why(None));
     }
-    ends("C", "gauges", "readings[24]", Some("something else acts"));
-    ends("C", "gauges", "readings[25]", Some("measures stress"));
+    ends("C", "gauges", "(reading 25)", Some("something else acts"));
+    ends("C", "gauges", "(reading 26)", Some("measures stress"));
     ends("", "gauges", "lux", Some("light meter"));
     assert!(found.is_empty(), "{found:?}");
 

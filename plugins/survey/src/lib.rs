@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 
+mod again;
 mod findings;
 pub mod photographed;
 mod rust;
@@ -9,4 +10,5 @@ mod site;
 mod strength;
 mod weighed;
 
+pub use again::found_again;
 pub use weighed::*;

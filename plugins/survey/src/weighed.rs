@@ -28,6 +28,7 @@ use intrados_stage::{Estimate, Job, time::DAY};
 use serde_json::json;
 
 use crate::{
+    again::is_superseded,
     findings,
     photographed::PHOTOGRAPHED,
     rust,
@@ -86,7 +87,14 @@ pub fn surveyed(
     let concrete = strength::Concrete::of(scene, index);
     said.put(Cause::Stiffness, &strength::stiffness(&concrete, &placed), profile, &site);
     let strengths = strength::strength(&concrete, &placed);
-    let findings = findings::lost(&site, &placed, &profile.rule);
+    // Of what was found again the latest counts.
+    let seen: Vec<&Observation> = all.iter().map(|(_, o)| *o).collect();
+    let is_old = is_superseded(&seen, site.length);
+    let old: Vec<usize> =
+        all.iter().zip(is_old).filter(|(_, old)| *old).map(|((number, _), _)| *number).collect();
+    let is_current = |p: &&Placed| !old.contains(&p.number);
+    let current: Vec<Placed> = placed.iter().filter(is_current).map(|p| Placed { ..*p }).collect();
+    let findings = findings::lost(&site, &current, &profile.rule);
     said.put(Cause::Concrete, &together(&strengths, &findings), profile, &site);
     let heard = |p: &&Placed| !said.unused.contains_key(&p.number);
     let used: Vec<&Placed> = placed.iter().filter(heard).collect();
@@ -97,7 +105,7 @@ pub fn surveyed(
         unused.extend(said.unused);
         return Ok(Surveyed { evidence: None, unused });
     };
-    evidence.crack_width_mm = findings::widest(&placed);
+    evidence.crack_width_mm = findings::widest(&current);
     if let serde_json::Value::Object(details) = json!({
         "observations": used.len(),
         "rust": steel.details(&site, &all),
@@ -217,8 +225,12 @@ impl Said {
 fn basis(used: &[&Placed], steel: &rust::Weighed) -> String {
     let mut kinds: BTreeMap<&str, usize> = BTreeMap::new();
     used.iter().for_each(|p| *kinds.entry(p.shows.kind()).or_default() += 1);
-    let list: Vec<String> = kinds.iter().map(|(kind, n)| format!("{n} {kind}")).collect();
-    let mut text = format!("{} observations ({})", used.len(), list.join(", "));
+    let list: Vec<String> = kinds
+        .iter()
+        .map(|(kind, n)| if *n == 1 { (*kind).to_owned() } else { format!("{n} × {kind}") })
+        .collect();
+    let noun = if used.len() == 1 { "observation" } else { "observations" };
+    let mut text = format!("{} {noun} ({})", used.len(), list.join(", "));
     if let Some((zone, active)) = steel.worst() {
         text += &format!(
             "; bars rust with a probability of {:.0} % at {} of the axis",

@@ -272,7 +272,7 @@ fn legend(ui: &Ui, rect: Rect) {
     painter.text(
         pos2(pale.left() - 4.0, pale.center().y),
         egui::Align2::RIGHT_CENTER,
-        "foretold",
+        "forecast",
         font,
         ink,
     );

@@ -112,7 +112,7 @@ fn bars(ui: &mut Ui, predicted: &Predicted) {
             predicted.basis[zone].name()
         ));
     }
-    ui.weak("from the start of the axis to its end; lines: 95 % intervals; greyed: foretold");
+    ui.weak("from the start of the axis to its end; lines: 95 % intervals; greyed: forecast");
 }
 
 fn evidence(ui: &mut Ui, told: &MemberPrediction) {

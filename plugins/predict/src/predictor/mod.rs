@@ -40,6 +40,7 @@ use serde::Serialize;
 use crate::{
     CT, Origin, PredictError, PredictSettings, SliceReading,
     compared::score,
+    defect::defects,
     limits::limits,
     prediction::{MemberPrediction, MissingEvidence, Prediction, SCHEMA},
     section,
@@ -601,6 +602,18 @@ impl Predictor {
             })
             .flatten();
         told.chain(seen).collect()
+    }
+
+    /// Whether anything has been found to be wrong with a member so far.
+    #[must_use]
+    pub(crate) fn has_found(&self, scene: &Scene, member: usize) -> bool {
+        let (Some(readings), Some(m)) = (self.readings.get(member), scene.members.get(member))
+        else {
+            return false;
+        };
+        let nothing = Shown::default();
+        let photographed = self.photographed.get(&member).unwrap_or(&nothing);
+        !defects(scene, &m.id, photographed, readings).is_empty()
     }
 
     /// The prediction from what is done so far.

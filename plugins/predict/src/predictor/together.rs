@@ -7,7 +7,7 @@ use intrados_damage::{
     fusion::Whole,
     grading::Profile,
     ledger, truth,
-    verdict::{Basis, Verdict},
+    verdict::{Basis, Looked, Verdict},
     zone::{ZONES, together, zone_at},
 };
 use intrados_forecast::FORECAST;
@@ -56,7 +56,7 @@ impl Predictor {
             *why = (!counted).then(|| match gathered.evidence[source].measured {
                 true => "the grading profile declares correlations that cannot be".into(),
                 false => {
-                    "what is foretold yields to what is measured, since the two differ by more than chance gives once in twenty".into()
+                    "measurements take precedence over the forecast, which differs from them by more than chance explains".into()
                 }
             });
         }
@@ -186,14 +186,18 @@ impl Predictor {
             evidence.values().filter(|e| whole.counted.contains(e.source)).collect();
         let damage = whole.damage();
         let zone_basis = Basis::by_zone(&said);
-        let verdict = Verdict::of(profile, damage, &profile.cracks(&said), Basis::of(&zone_basis));
+        let found = survey::of_member(scene, &member.id).map(|(_, o)| o);
+        let nothing = Shown::default();
+        let photographed = self.photographed.get(&index).unwrap_or(&nothing);
+        let defects = defects(scene, &member.id, photographed, &self.readings[index]);
+        let looked = Looked::of(profile, &said);
+        let looked = Looked { found: looked.found || !defects.is_empty(), ..looked };
+        let cracks = profile.cracks(&said);
+        let verdict = Verdict::of(profile, damage, &cracks, Basis::of(&zone_basis), looked);
         let widest = evidence
             .values()
             .filter_map(|e| Some((e.source, e.crack_width_mm?)))
             .max_by(|a, b| a.1.total_cmp(&b.1));
-        let found = survey::of_member(scene, &member.id).map(|(_, o)| o);
-        let nothing = Shown::default();
-        let photographed = self.photographed.get(&index).unwrap_or(&nothing);
         let mut conflicts = whole.conflicts.clone();
         conflicts
             .extend(unforeseen(found.chain(&photographed.observations), evidence.get(FORECAST)));
@@ -212,6 +216,7 @@ impl Predictor {
             zone_basis,
             advice: verdict.advice,
             within_months: verdict.within_months,
+            to_inspect: verdict.to_inspect,
             states: shares(&whole, profile),
             crack_check: widest.and_then(|widest| crack_check(scene, member, widest, profile)),
             conflict: !conflicts.is_empty(),
@@ -220,7 +225,7 @@ impl Predictor {
             worst_zone: whole.worst,
             conflicts,
             truth: self.truth(member, &self.readings[index]),
-            defects: defects(scene, &member.id, photographed, &self.readings[index]),
+            defects,
             gauges: self.measured.get(&index).cloned().unwrap_or_default(),
             faces: photographed.faces.clone(),
             evidence,
@@ -311,9 +316,14 @@ fn unforeseen<'a>(
         {
             let [from, to] = o.spot.along;
             Some(format!(
-                "{}: a diagonal crack {width_mm:.2} ± {std_error_mm:.2} mm wide at {:.2} of the axis, where the forecast opens none wider than {foretold:.2} mm",
+                "{}: a diagonal crack {width_mm:.2} ± {std_error_mm:.2} mm wide at {:.0} % of the length, where the forecast expects {}",
                 o.name,
-                0.5 * (from + to),
+                50.0 * (from + to),
+                if foretold < 0.005 {
+                    "none".into()
+                } else {
+                    format!("none wider than {foretold:.2} mm")
+                }
             ))
         }
         _ => None,
@@ -340,9 +350,10 @@ pub(super) fn part_of<'a>(
 /// Shares of the known zones that are to be expected in each state.
 fn shares(whole: &Whole, profile: &Profile) -> BTreeMap<String, f64> {
     let known: Vec<Estimate> = whole.zones.0.iter().flatten().copied().collect();
+    let of = |zone| Verdict::of(profile, Some(zone), &[], Basis::Measured, Looked::NOWHERE);
     let mut shares = BTreeMap::new();
     for zone in &known {
-        for (state, p) in Verdict::of(profile, Some(*zone), &[], Basis::Measured).probability {
+        for (state, p) in of(*zone).probability {
             *shares.entry(state).or_default() += p / known.len() as f64;
         }
     }

@@ -1,5 +1,6 @@
 //! Defects as topics of the BIM Collaboration Format, for programs that have the IFC model open:
-//! what it is, how urgent, which member, and a camera that looks at it.
+//! what it is, how urgent, which member, a camera that looks at it, and its picture where there is
+//! one.
 //!
 //! The camera stands in IFC's axes, z up, and in the coordinates of the model that was imported.
 
@@ -9,6 +10,7 @@ mod xml;
 use std::io::{self, Cursor, Write};
 
 use glam::DVec3;
+use intrados_ct::Picture;
 use intrados_damage::zone::ZONES;
 use intrados_predict::{Defect, MemberPrediction, Prediction};
 use intrados_scene::{
@@ -16,13 +18,15 @@ use intrados_scene::{
     structure::{Date, Georeference},
 };
 use serde_json::json;
-use view::{View, surface, view};
+use view::{View, view};
 use zip::{CompressionMethod, DateTime, ZipWriter, write::SimpleFileOptions};
 
 use crate::{
     basis::Basis,
+    surface::concrete,
     words::{
-        NOTHING, bad_probability, defect, due, finding, level, matters, metres, word, worse_half,
+        NOTHING, bad_probability, defect, due, finding, level, matters, metres, state, word,
+        worse_half,
     },
 };
 
@@ -42,8 +46,14 @@ const TYPES: [&str; 2] = ["Defect", "Issue"];
 const OPEN: [&str; 1] = ["Open"];
 /// By the worst state that a member may be in, from the best.
 const PRIORITIES: [&str; 4] = ["Low", "Medium", "High", "Critical"];
+/// That of what is to be inspected, since nobody has looked at it enough.
+const NORMAL: usize = 1;
 /// Name of a topic's camera.
 const VIEWPOINT: &str = "viewpoint.bcfv";
+/// Name of what the defect looks like.
+const SNAPSHOT: &str = "snapshot.png";
+/// Its longer side, pixels.
+const SNAPSHOT_SIDE: u32 = 480;
 /// Width over height of the picture that a camera is for.
 const ASPECT: f64 = 4.0 / 3.0;
 /// Its angle from bottom to top, degrees.
@@ -75,14 +85,19 @@ pub fn bcf(
             found.push(None);
         }
         let index = scene.members.iter().position(|m| m.id == member.id);
-        let surface = index.filter(|_| !found.is_empty()).map(|i| surface(scene, i));
+        let surface = index.filter(|_| !found.is_empty()).map(|i| concrete(scene, i));
         for defect in found {
             let topic = Told { member, defect };
             let view = index.zip(surface.as_ref()).map(|(i, surface)| {
                 view(&scene.members[i], surface, topic.along(), defect.and_then(|d| d.angle_deg))
             });
             let guid = teller.guid(&topic, "topic");
-            file.add(&format!("{guid}/markup.bcf"), &teller.markup(&topic))?;
+            let snapshot = defect.and_then(picture);
+            let markup = teller.markup(&topic, snapshot.is_some().then_some(SNAPSHOT));
+            file.add(&format!("{guid}/markup.bcf"), &markup)?;
+            if let Some(png) = snapshot {
+                file.add_bytes(&format!("{guid}/{SNAPSHOT}"), &png)?;
+            }
             file.add(&format!("{guid}/{VIEWPOINT}"), &teller.viewpoint(&topic, view))?;
         }
     }
@@ -150,9 +165,10 @@ impl Teller<'_> {
         uuid::Builder::from_custom_bytes(bytes).into_uuid().to_string()
     }
 
-    fn markup(&self, told: &Told) -> xml::Markup {
+    fn markup(&self, told: &Told, snapshot: Option<&'static str>) -> xml::Markup {
         let m = told.member;
-        let view = xml::ViewPoint { guid: self.guid(told, "viewpoint"), viewpoint: VIEWPOINT };
+        let guid = self.guid(told, "viewpoint");
+        let view = xml::ViewPoint { guid, viewpoint: VIEWPOINT, snapshot };
         let (beside, within) = match self.version {
             Version::V2_1 => (Some(view), None),
             Version::V3_0 => (None, Some(xml::Viewpoints { view_point: view })),
@@ -164,7 +180,10 @@ impl Teller<'_> {
                 topic_type: TYPES[usize::from(told.defect.is_none())],
                 status: OPEN[0],
                 title: format!("{}: {}", m.name, told.defect.map_or_else(|| finding(m), defect)),
-                priority: m.state_run.map(|[_, worst]| PRIORITIES[level(worst, states)]),
+                priority: m.state_run.map(|[_, worst]| match m.to_inspect {
+                    true => PRIORITIES[NORMAL],
+                    false => PRIORITIES[level(worst, states)],
+                }),
                 creation_date: self.created.clone(),
                 creation_author: format!("Intrados {}", self.prediction.version),
                 due_date: m
@@ -193,9 +212,10 @@ impl Teller<'_> {
             let side = d.angle_deg.map(|a| format!("Side: {a:.0}° about the axis"));
             let size = (!d.size.is_empty()).then(|| format!("Size: {}", d.size));
             let quantity = d.quantity().map(|q| format!("Quantity: {q}"));
-            lines.extend([side, size, quantity].into_iter().flatten());
+            let change = d.change().map(|c| format!("Course: {c}"));
+            lines.extend([side, size, quantity, change].into_iter().flatten());
             let date = d.date.as_ref().map_or_else(String::new, |date| format!(", {date}"));
-            lines.push(format!("Told by: {}, {}{date}", word(d.source), d.item));
+            lines.push(format!("Source: {}, {}{date}", word(d.source), d.item));
         }
         let damage = m.damage.zip(m.damage_std_error);
         let damage = damage.map_or_else(|| NOTHING.into(), |(d, s)| format!("{d:.2} ± {s:.2}"));
@@ -203,7 +223,7 @@ impl Teller<'_> {
         lines.push(format!("Damage: {damage} (0 sound, 1 lost)"));
         let bad: Vec<&str> =
             worse_half(&self.prediction.profile).iter().map(|s| s.name.as_str()).collect();
-        lines.push(format!("State: {}; {likely:.0} % {}", m.state, bad.join(" or ")));
+        lines.push(format!("State: {}; {likely:.0} % {}", state(m), bad.join(" or ")));
         lines.push(format!("To do: {}", m.advice));
         lines.push(format!("When: {}", due(m, self.basis)));
         lines.join("\n")
@@ -232,6 +252,12 @@ impl Teller<'_> {
             }),
         }
     }
+}
+
+/// What a defect looks like, PNG: its photograph, or what was cut out of one or of a slice.
+fn picture(defect: &Defect) -> Option<Vec<u8>> {
+    let photo = defect.photo.as_ref().and_then(|photo| Picture::read(photo, SNAPSHOT_SIDE));
+    photo.as_ref().or(defect.picture.as_ref())?.png()
 }
 
 /// We have y up, IFC has z.
@@ -269,11 +295,16 @@ impl Archive {
     }
 
     fn add(&mut self, name: &str, content: &impl serde::Serialize) -> io::Result<()> {
+        let text = xml::text(content).map_err(io::Error::other)?;
+        self.add_bytes(name, text.as_bytes())
+    }
+
+    fn add_bytes(&mut self, name: &str, content: &[u8]) -> io::Result<()> {
         let options = SimpleFileOptions::default()
             .compression_method(CompressionMethod::Stored)
             .last_modified_time(DateTime::default());
         self.0.start_file(name, options)?;
-        self.0.write_all(xml::text(content).map_err(io::Error::other)?.as_bytes())
+        self.0.write_all(content)
     }
 
     fn finish(self) -> io::Result<Vec<u8>> {

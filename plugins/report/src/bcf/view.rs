@@ -1,7 +1,7 @@
 //! From where to look at a place of a member.
 
 use glam::Vec3;
-use intrados_scene::{Frame, Member, Part, Scene};
+use intrados_scene::{Frame, Member};
 
 /// Nearer than this nobody steps, m.
 const NEAREST: f32 = 1.5;
@@ -14,17 +14,6 @@ pub(super) struct View {
     pub(super) eye: Vec3,
     pub(super) direction: Vec3,
     pub(super) up: Vec3,
-}
-
-/// The concrete's triangles of a member, in the world.
-pub(super) fn surface(scene: &Scene, member: usize) -> Vec<[Vec3; 3]> {
-    let own = scene.objects.iter().filter(|o| o.member == Some(member) && o.part == Part::Concrete);
-    own.filter_map(|o| Some((o, scene.meshes.get(o.mesh)?)))
-        .flat_map(|(o, mesh)| {
-            let place = |t| mesh.corners(t).map(|p| o.transform.transform_point3(p));
-            (0..mesh.triangles.len()).map(place)
-        })
-        .collect()
 }
 
 /// At a piece of the axis (none: all of it) and a side (none: across, at a person's height): a

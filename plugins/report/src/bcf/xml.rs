@@ -84,6 +84,8 @@ pub(super) struct ViewPoint {
     #[serde(rename = "@Guid")]
     pub(super) guid: String,
     pub(super) viewpoint: &'static str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) snapshot: Option<&'static str>,
 }
 
 /// `viewpoint.bcfv`.
