@@ -525,7 +525,7 @@ fn nonsense_is_refused_before_anything_is_written() {
     place.refuses("attach", &["C1", &csv, "--rust", "1"], 2, &["--rust"]);
     // of the member and the place
     place.refuses("attach", &["C2", "--intact"], 65, &["\"C2\"", "did you mean \"C1\"?"]);
-    place.refuses("attach", &["pier north", "--intact"], 65, &["there are B1, C1"]);
+    place.refuses("attach", &["pier north", "--intact"], 65, &["there are \"B1\", \"C1\""]);
     place.refuses("attach", &with(&["--along", "1.2"]), 65, &["along: 1.2 is outside 0 to 1"]);
     place.refuses("attach", &with(&["--along", "0.5,0.3"]), 65, &["turn them round"]);
     place.refuses("attach", &with(&["--face", "crown"]), 65, &["face: Crown", "Front, Right"]);
@@ -537,7 +537,12 @@ fn nonsense_is_refused_before_anything_is_written() {
     // of files
     let csv = |text: &str| place.brings("t.csv", text);
     place.refuses("attach", &["C1", "none.csv"], 66, &["none.csv", "check the path"]);
-    place.refuses("attach", &["C1", &csv("along,x\n0,1\n")], 65, &["t.csv:1", "no column \"x\""]);
+    place.refuses(
+        "attach",
+        &["C1", &csv("along,x\n0,1\n")],
+        65,
+        &["t.csv:1", "no column says", "\"x\" is not known"],
+    );
     place.refuses("attach", &["C1", &csv("along\n0\n")], 65, &["t.csv:1", "mV"]);
     place.refuses("attach", &["C1", &csv("value\n3\n")], 65, &["t.csv:1", "kind and unit"]);
     place.refuses("attach", &["C1", &csv("gauge,value\nSG1,3\n")], 65, &["t.csv:1", "ue, m/m"]);
@@ -601,4 +606,199 @@ fn where_there_is_no_scene_nothing_is_attached() {
     place.refuses("attach", &["C1", "--intact"], 65, &["evidence.ron:1:"]);
     fs::write(place.path("bridge/evidence.ron"), "(schema: \"intrados.evidence/7\")").unwrap();
     place.refuses("detach", &["C1", "mine"], 65, &["intrados.evidence/1"]);
+}
+
+#[test]
+fn wrong_units_are_told() {
+    let place = Place::new();
+    let table = |name: &str, rows: &str| {
+        place.brings(name, format!("gauge,value,along,face,depth_mm\n{rows}"))
+    };
+    let refused = |member: &str, file: &str, unit: &str, words: &[&str]| {
+        place.refuses("attach", &[member, file, "--unit", unit], 65, words);
+    };
+    let large = table("large.csv", "G1,10,0.5,front,\nG2,12,0.5,front,\nG3,11,0.5,front,\n");
+    let words = ["large.csv:2", "1000 %", "unit ue", "2 more rows have the same fault"];
+    refused("C1", &large, "m/m", &words);
+    let counts = table("counts.csv", "G1,250000,0.5,front,\n");
+    refused("C1", &counts, "ue", &["counts.csv:2", "25 %", "amplifier"]);
+    let small = table("small.csv", "G1,4e-5,0.5,front,\nG2,0,0.5,front,\n");
+    refused("C1", &small, "ue", &["small.csv: column value", "unit m/m"]);
+    let far = table("far.csv", "D1,-12,0.5,bottom,\n");
+    refused("B1", &far, "m", &["far.csv:2", "more than B1 is long", "unit mm"]);
+    let deep = table("deep.csv", "G1,40,0.5,front,700\n");
+    refused("C1", &deep, "ue", &["deep.csv:2", "700 mm is deeper than C1"]);
+    // What is small and what is large is taken.
+    place.done("attach", &["C1", &small, "--unit", "m/m"]);
+    let nought = table("nought.csv", "G9,0,0.5,front,\n");
+    place.done("attach", &["C1", &nought, "--unit", "ue"]);
+    let spall = ["C1", "--spall", "0.1", "--depth-mm", "700"];
+    place.refuses("attach", &spall, 65, &["depth_mm: 700 mm is deeper"]);
+    let newtons = ["B1", "--load-test", "car", "--force-kn", "60000", "--along", "0.5"];
+    place.refuses("attach", &newtons, 65, &["crushes the whole section of B1", "write 60"]);
+    let slice = place.slice("core.png");
+    let cut = |mm, diameter, depth| {
+        [
+            "C1",
+            &slice,
+            "--pixel-mm",
+            mm,
+            "--diameter-mm",
+            diameter,
+            "--along",
+            "0.5",
+            "--depth-mm",
+            depth,
+        ]
+    };
+    place.refuses("attach", &cut("50", "100", "30"), 65, &["core.png", "µm?"]);
+    place.refuses("attach", &cut("3", "100", "30"), 65, &["144 mm across", "core 100 mm", "µm"]);
+    place.refuses("attach", &cut("2", "100", "600"), 65, &["depth_m: 600 mm is deeper than C1"]);
+    // 96 mm of a core in 128 mm of picture.
+    place.done("attach", &cut("2", "100", "30"));
+}
+
+#[test]
+fn what_a_gauge_has_shown_counts_once() {
+    let place = Place::with_evidence();
+    let csv = place.brings("load test.csv", "gauge,value,test\nSG1,41.5,truck\n");
+    place.done("attach", &["C1", &csv, "--unit", "ue"]);
+    let copy = place.brings("copy.csv", "gauge,value,test\nSG1,41.5,truck\n");
+    let words = ["copy.csv:2", "SG1 shows what", "load test.csv:2", "leave one"];
+    place.refuses("attach", &["C1", &copy, "--unit", "ue"], 65, &words);
+    let other = place.brings("other.csv", "gauge,value,test\nSG1,41.6,truck\n");
+    place.done("attach", &["C1", &other, "--unit", "ue"]);
+}
+
+#[test]
+fn columns_that_nobody_knows_are_passed_over_and_said() {
+    let place = Place::new();
+    let csv = place.brings("hc.csv", "along,mV,comment,x_m\n0.5,-310,wet,1.5\n");
+    let output = place.run("attach", &["C1", &csv, "--format", "json"]);
+    let said = String::from_utf8(output.stderr).unwrap();
+    let told: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let note = "hc.csv: the columns comment, x_m are not known";
+    assert!(said.contains(note) && !said.contains(".attach-"), "{said}");
+    assert!(told["notes"][0].as_str().unwrap().contains(note), "{told}");
+    for (name, text, words) in [
+        ("alog.csv", "alog,mV\n0.5,-310\n", &["alog", "did you mean along?"][..]),
+        ("angle.csv", "angle,mV\n0,-310\n", &["angle", "says no unit", "angle_deg"]),
+        (
+            "none.csv",
+            "Position,reading\n0.5,-310\n",
+            &["no column says", "Position, reading", "mV"],
+        ),
+    ] {
+        let csv = place.brings(name, text);
+        place.refuses("attach", &["C1", &csv], 65, words);
+    }
+}
+
+#[test]
+fn attached_at_once_all_are_there() {
+    let place = Place::with_evidence();
+    let folder = place.path("bridge");
+    let all: Vec<_> = (0..8)
+        .map(|_| {
+            let mut command = common::program();
+            command.args(["attach", text(&folder), "C1", "--rust", "0.1", "--quiet"]);
+            command.stdout(std::process::Stdio::null()).spawn().unwrap()
+        })
+        .collect();
+    assert!(all.into_iter().all(|mut child| child.wait().unwrap().success()));
+    assert_eq!(place.attached().len(), 9);
+    let names: Vec<PathBuf> =
+        fs::read_dir(&folder).unwrap().map(|e| e.unwrap().file_name().into()).collect();
+    assert_eq!(names.len(), 2, "{names:?}");
+}
+
+#[test]
+fn what_is_no_number_and_no_name_is_told() {
+    let place = Place::new();
+    for option in ["--rust", "--cover", "--half-cell", "--spall", "--rebound"] {
+        place.refuses("attach", &["C1", option, "nan"], 2, &[option, "not a number"]);
+    }
+    place.refuses("attach", &["C1", "--crack", "nan", "--course", "map"], 2, &["not a number"]);
+    place.refuses("attach", &["C1", "--chloride", "5:nan"], 2, &["numbers"]);
+    let more = |option, value| ["C1", "--cover", "30", option, value];
+    for option in ["--along", "--std-error", "--height", "--angle"] {
+        place.refuses("attach", &more(option, "nan"), 2, &[option, "not a number"]);
+    }
+    place.refuses("attach", &["C1", "--cover", "0,3"], 2, &["write 0.3"]);
+    place.refuses("attach", &more("--name", " "), 65, &["the name is empty"]);
+    let photo = place.brings("core.jpg", "");
+    place.refuses("attach", &["C1", &photo], 65, &["photograph", "--pose", "--picture"]);
+}
+
+/// People know members by their names, and faces.
+#[test]
+fn members_and_faces_are_said_by_their_names() {
+    let place = Place::new();
+    let named = SCENE.replace("(id: \"B1\",", "(id: \"1kTv$9xQ\", name: \"north girder\",");
+    fs::write(place.path("bridge/scene.ron"), named).unwrap();
+    let told = place.run("attach", &["north girder", "--rust", "0.1", "--face", "bottom"]);
+    let told = String::from_utf8(told.stdout).unwrap();
+    assert!(told.contains("rust 1 of north girder") && told.contains("bottom"), "{told}");
+    let list = String::from_utf8(place.run("detach", &["--list"]).stdout).unwrap();
+    assert!(list.contains("north girder") && list.contains("bottom"), "{list}");
+    assert!(!list.contains("1kTv$9xQ") && !list.contains('°'), "{list}");
+    let words = ["there are \"C1\", \"north girder\""];
+    place.refuses("attach", &["pier", "--intact"], 65, &words);
+    let told = place.run("detach", &["north girder", "rust 1"]);
+    assert!(String::from_utf8(told.stdout).unwrap().contains("rust 1 of north girder"));
+}
+
+#[test]
+fn what_is_dated_before_its_member_was_built_is_refused() {
+    let place = Place::new();
+    let aged = SCENE.replace(
+        "height_m: 3), concrete: \"C30/37\"",
+        "height_m: 3), concrete: \"C30/37\", exposure: (class: \"XC4\", years: 20)",
+    );
+    fs::write(place.path("bridge/scene.ron"), aged).unwrap();
+    let on = |date| ["C1", "--carbonation", "12", "--along", "0.5", "--date", date];
+    place.refuses("attach", &on("1899-05-03"), 65, &["date: 1899-05-03", "before C1 was built"]);
+    let csv = place.brings("old.csv", "along,mV,date\n0.5,-310,1951-05-03\n");
+    place.refuses("attach", &["C1", &csv], 65, &["date: 1951-05-03"]);
+    place.done("attach", &on("2020-05-03"));
+    // Nobody says how old this one is.
+    place.done("attach", &["B1", "--rust", "0.1", "--date", "1951-05-03"]);
+}
+
+/// Of what is not used, all that can be told without computing is told by `validate`.
+#[test]
+fn validate_says_what_a_member_cannot_hear() {
+    let place = Place::new();
+    let scene = SCENE.replace(
+        "height_m: 3), concrete: \"C30/37\"",
+        "height_m: 3, reinforcement: (cover_mm: 40, bars: [Around(count: 8, diameter_mm: 16)])), concrete: \"C30/37\", exposure: (class: \"XC4\", years: 20)",
+    );
+    fs::write(place.path("bridge/scene.ron"), scene).unwrap();
+    let warned = || {
+        let output = run(&["validate", text(&place.path("bridge/scene.ron")), "--format", "json"]);
+        let told: Value = serde_json::from_slice(&output.stdout).unwrap();
+        let all = told["files"][0]["problems"].as_array().unwrap().clone();
+        all.into_iter()
+            .filter(|p| p["code"] == "NOT_USED")
+            .map(|p| {
+                format!("{}: {}", p["place"].as_str().unwrap(), p["message"].as_str().unwrap())
+            })
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(warned(), [] as [String; 0]);
+    for args in [
+        &["C1", "--carbonation", "12", "--along", "0.5"][..],
+        &["C1", "--half-cell", "-310", "--along", "0.5"],
+        &["C1", "--chloride", "5:1,15:0.5", "--along", "0.5"],
+        &["B1", "--half-cell", "-310", "--along", "0.5"],
+        &["B1", "--cover", "40", "--along", "0.5"],
+        &["B1", "--rebound", "40", "--along", "0.5"],
+    ] {
+        place.done("attach", args);
+    }
+    let told = warned();
+    assert_eq!(told.len(), 2, "{told:?}");
+    assert!(told[0].contains("chloride 1") && told[0].contains("no salt"), "{told:?}");
+    assert!(told[1].contains("evidence of B1") && told[1].contains("and 1 more"), "{told:?}");
+    assert!(told[1].contains("none are known of the member"), "{told:?}");
 }

@@ -263,6 +263,24 @@ fn a_new_scene_is_a_good_scene() {
             let made = json(&["new", kind, text(&path)]);
             assert_eq!(made["schema"], "intrados.new/1");
             assert_eq!(code(&["validate", text(&path)]), 0, "{kind}.{extension}");
+            let beside = folder.path().join(format!("{kind}.evidence.ron"));
+            assert_eq!(
+                made["files"].as_array().unwrap().len(),
+                1 + usize::from(extension == "ron")
+            );
+            if extension == "ron" {
+                // Nothing is said yet, and it is read with the scene.
+                let evidence = fs::read_to_string(&beside).unwrap();
+                assert!(evidence.contains("// (member:") && evidence.contains("Efflorescence("));
+                assert_eq!(code(&["new", kind, text(&path)]), 73);
+                fs::remove_file(&path).unwrap();
+                assert_eq!(code(&["new", kind, text(&path)]), 73, "{}", beside.display());
+                assert_eq!(code(&["new", kind, text(&path), "--force"]), 0);
+                fs::write(&beside, evidence.replace("// (", "(")).unwrap();
+                // Its examples name files that are not there.
+                assert_eq!(code(&["validate", text(&path)]), 66);
+                fs::write(&beside, evidence).unwrap();
+            }
             let output = run(&["info", text(&path), "--format", "json"]);
             let info: Value = serde_json::from_slice(&output.stdout).unwrap();
             let members = info["scenes"][0]["members"].as_array().unwrap();
@@ -272,6 +290,21 @@ fn a_new_scene_is_a_good_scene() {
             );
         }
     }
+}
+
+#[test]
+fn bent_quotes_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("wrong.ron");
+    fs::write(&path, "(\n    schema: “intrados.scene/1”,\n)").unwrap();
+    let output = run(&["validate", text(&path)]);
+    let said = String::from_utf8(output.stdout).unwrap();
+    assert_eq!(output.status.code(), Some(65));
+    assert!(said.contains("wrong.ron:2:") && said.contains("bent quote"), "{said}");
+    let curly = "(schema: \"intrados.scene/1\", title: \"a “quoted” word\", x: 1)";
+    fs::write(&path, curly).unwrap();
+    let said = String::from_utf8(run(&["validate", text(&path)]).stdout).unwrap();
+    assert!(!said.contains("bent quote"), "{said}");
 }
 
 #[test]

@@ -231,7 +231,9 @@ fn a_thousand_identical_names_are_a_thousand_members() {
         })
         .collect();
     let output = place.import(&place.answer(&boxes));
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{said}");
+    assert!(said.contains("999 members have a GlobalId that another has"), "{said}");
     let scene = place.path("out").join("scene.ron");
     let info = run(&["info", text(&scene), "--format", "json", "--quiet"]);
     let info: Value = serde_json::from_slice(&info.stdout).unwrap();
@@ -286,6 +288,11 @@ fn an_obj_in_millimetres_is_asked_for_its_unit() {
     let faces = "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n";
     fs::write(&path, format!("{corners}o column 1\n{faces}")).unwrap();
     let out = folder.path().join("out");
+    let refused = run(&["import", text(&path), "--out", text(&out), "--unit", "m"]);
+    let said = String::from_utf8(refused.stderr).unwrap();
+    assert_eq!(refused.status.code(), Some(65), "{said}");
+    let words = ["column 1", "4.0 km long", "is the unit wrong?", "--unit"];
+    assert!(words.iter().all(|word| said.contains(word)) && !said.contains(".import-"), "{said}");
     let asked = run(&["import", text(&path), "--out", text(&out)]);
     assert_eq!(asked.status.code(), Some(65));
     assert!(String::from_utf8_lossy(&asked.stderr).contains("--unit mm"));
@@ -354,4 +361,66 @@ fn bars_that_would_lie_outside_are_not_assumed() {
         assert!(said.contains(word), "{word}: {said}");
     }
     assert_eq!(members_of(&out.join("scene.ron"))[0]["bars"], 0);
+}
+
+/// IFC says its unit itself, and what somebody says beside it would be lost.
+#[test]
+fn a_unit_beside_an_ifc_is_refused() {
+    let place = Place::new(WHOLE);
+    let output = program()
+        .args(["import", text(&place.path("model.ifc")), "--out", text(&place.path("out"))])
+        .args(["--unit", "mm"])
+        .output()
+        .unwrap();
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(65), "{said}");
+    assert!(said.contains("leave --unit out") && place.is_untouched(), "{said}");
+}
+
+/// Links alone carry nothing along their beam.
+#[test]
+fn a_beam_of_links_alone_is_said() {
+    let place = Place::new(WHOLE);
+    let python = place.answer(&[("IfcBeam", "girder", [0.0; 3], [8.0, 0.4, 0.6])]);
+    let path = place.path("elements.json");
+    let mut told: Value = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
+    let link = |x: f64| {
+        let corners = [[0.05, 0.05], [0.35, 0.05], [0.35, 0.55], [0.05, 0.55], [0.05, 0.05]];
+        let line: Vec<_> = corners.iter().map(|[y, z]| json!([x, y, z])).collect();
+        json!({
+            "step": 7, "id": format!("link {x}"), "class": "IfcReinforcingBar", "name": "link",
+            "object_type": "", "predefined": "LIGATURE", "type": "", "above": [],
+            "properties": {}, "attributes": {}, "materials": [],
+            "courses": [{"diameter": 0.01, "line": line}], "shapes": [],
+        })
+    };
+    let elements = told["elements"].as_array_mut().unwrap();
+    elements.extend([link(2.0), link(6.0)]);
+    fs::write(&path, told.to_string()).unwrap();
+    let output = place.import(&python);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{said}");
+    assert!(said.contains("no bars along \"girder\"") && said.contains("2 links"), "{said}");
+}
+
+/// What the model does not state, details do.
+#[test]
+fn classes_that_are_stated_are_not_said_to_be_missing() {
+    let place = Place::new(WHOLE);
+    let python = place.answer(&[
+        ("IfcColumn", "pier", [0.0; 3], [0.5, 0.5, 4.0]),
+        ("IfcColumn", "post", [4.0, 0.0, 0.0], [0.5, 0.5, 4.0]),
+    ]);
+    assert!(place.import(&python).status.success());
+    let scene = place.path("out").join("scene.ron");
+    let said = || String::from_utf8(run(&["validate", text(&scene)]).stdout).unwrap();
+    assert!(!said().contains("state no concrete class"), "{}", said());
+    let text = fs::read_to_string(&scene).unwrap();
+    let assumed = text.replacen("assumed: [", "assumed: [Concrete, ", 1);
+    fs::write(&scene, assumed.replacen("C35/45", "C20/25", 1)).unwrap();
+    assert!(
+        said().contains("one member states no concrete class: C20/25 is assumed"),
+        "{}",
+        said()
+    );
 }

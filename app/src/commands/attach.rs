@@ -117,8 +117,7 @@ fn too_wide(
     match cut.diameter_mm.map(f64::from) {
         // Across, it is as wide as the core; along, as thin.
         Some(core) if thin > WIDER * core => Some(format!(
-            "{path}: at {pixel} mm a pixel what it shows is {thin:.0} mm across, and the core {core} mm: is the pixel in µm? write {}",
-            pixel / 1000.0
+            "{path}: at {pixel} mm a pixel what it shows is {thin:.0} mm across, and the core {core} mm: is --pixel-mm in µm, or --diameter-mm wrong?"
         )),
         _ if size > 0.0 && wide > WIDER * size => Some(format!(
             "{path}: at {pixel} mm a pixel what it shows is {:.1} m wide, and {} {:.1} m from corner to corner: is the pixel in µm? write {}",

@@ -1,10 +1,10 @@
 //! `intrados new`: a parametric scene to start from.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use intrados_scene::{
     Scene,
-    parametric::{template, write_glb},
+    parametric::{evidence_template, template, write_glb},
 };
 use serde::Serialize;
 
@@ -28,11 +28,28 @@ pub(crate) fn run(session: &Session, args: &args::New) -> Result<Outcome, Failur
     let path = args.file.clone().unwrap_or_else(|| PathBuf::from(format!("{}.ron", args.kind)));
     let text = template(&args.kind)
         .ok_or_else(|| Failure::Usage(format!("there is no template {}", args.kind)))?;
-    if path.exists() && !args.force {
-        return Err(Failure::cannot_write(&path, "it is there already; --force replaces it"));
+    let is_scene = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("ron"));
+    // Read with the scene: a command that names that reads this, too.
+    let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    let evidence = evidence_template(&args.kind, &name).filter(|_| is_scene);
+    let beside = path.with_extension("evidence.ron");
+    let taken = |place: &Path| place.exists() && !args.force;
+    if let Some(place) =
+        [&path, &beside].into_iter().take(1 + usize::from(is_scene)).find(|p| taken(p))
+    {
+        return Err(Failure::cannot_write(place, "it is there already; --force replaces it"));
     }
     match path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).as_deref() {
-        Some("ron") => output::put(&path, text.as_bytes())?,
+        Some("ron") => {
+            let evidence = evidence.as_deref().unwrap_or_default();
+            let was_there = beside.exists();
+            output::put(&beside, evidence.as_bytes())?;
+            output::put(&path, text.as_bytes()).inspect_err(|_| {
+                if !was_there {
+                    let _ = std::fs::remove_file(&beside);
+                }
+            })?;
+        }
         Some("glb") => {
             // The template is a scene like any other: it is loaded from a folder of its own and
             // written as a model.
@@ -54,8 +71,10 @@ pub(crate) fn run(session: &Session, args: &args::New) -> Result<Outcome, Failur
         schema: "intrados.new/1",
         version: env!("CARGO_PKG_VERSION"),
         kind: args.kind.clone(),
-        files: output::names(&[path]),
+        files: output::names(&if is_scene { vec![path, beside] } else { vec![path] }),
     };
-    session.print(&report, || format!("file {}", report.files.join(" ")))?;
+    session.print(&report, || {
+        report.files.iter().map(|file| format!("file {file}")).collect::<Vec<_>>().join("\n")
+    })?;
     Ok(Outcome::Done)
 }

@@ -91,3 +91,15 @@ pub(crate) fn unwritten(error: &std::io::Error) -> String {
         },
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_cannot_be_written_has_a_remedy_and_no_name_of_a_file_aside() {
+        let denied = std::io::Error::new(std::io::ErrorKind::PermissionDenied, "at /x/.tmp-abc");
+        let said = unwritten(&denied);
+        assert!(said.contains("permissions") && !said.contains(".tmp"), "{said}");
+    }
+}

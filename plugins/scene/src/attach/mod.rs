@@ -374,6 +374,7 @@ impl Project {
         let proposed = self.with(entry(&here)?)?;
         let scene = Scene::load_proposed(&self.scene, &proposed, &self.access, job)
             .map_err(|error| self.told_of(error, aside.as_ref(), what))?;
+        self.not_before_it_was_built(&before, &scene, what)?;
         let text = self.with(entry(&place)?)?;
         let known: HashSet<String> = listed(&before).iter().map(|l| format!("{l:?}")).collect();
         let mut added = listed(&scene);
@@ -385,6 +386,45 @@ impl Project {
         Ok(Proposal { project: self, scene, name, added, notes, text, aside, place })
     }
 
+    /// Refuses what is dated before its member was built, where that is known and not assumed.
+    fn not_before_it_was_built(
+        &self,
+        before: &Scene,
+        scene: &Scene,
+        what: &Attachment,
+    ) -> Result<(), AttachError> {
+        let Some(year) = self.built(scene, &what.member) else { return Ok(()) };
+        let known = before.structure.observations.len();
+        let rows = scene.structure.observations.iter().skip(known).filter_map(|o| o.date);
+        let sampled = |scene: &Scene| -> HashSet<(String, Date)> {
+            let all = scene.structure.series.iter();
+            all.flat_map(|s| s.samples.iter().map(|one| (s.gauge.clone(), one.date))).collect()
+        };
+        let (old, new) = (sampled(before), sampled(scene));
+        let samples = new.difference(&old).map(|(_, date)| *date);
+        match what.date.into_iter().chain(rows).chain(samples).find(|d| d.year() < year) {
+            Some(date) => Err(AttachError::BadInput(format!(
+                "date: {date} is before {} was built, some time in {year} by the years of its exposure: correct one of the two",
+                scene.name_of(&what.member)
+            ))),
+            None => Ok(()),
+        }
+    }
+
+    /// The earliest year in which a member can have been built, where the scene says how long it
+    /// has been exposed.
+    fn built(&self, scene: &Scene, member: &str) -> Option<i32> {
+        let text = access::read(&self.scene, crate::file::MAX_BYTES as u64).ok()?;
+        let file = crate::file::parse("", std::str::from_utf8(&text).ok()?).ok()?;
+        let detail = file.details.iter().find(|d| d.member == member);
+        if detail.is_some_and(|d| d.assumed.contains(&crate::file::Assumed::Age)) {
+            return None;
+        }
+        let years = scene.structure.assembly_of(member)?.exposure.as_ref()?.years;
+        // Whole years, rounded either way.
+        (years > 0.0).then(|| Date::today().year() - years.ceil() as i32 - 1)
+    }
+
     /// What the loading of a proposal says, in the words of who proposed it: places in the file
     /// that is not written, and in copies that will not stay, mean nothing to him.
     fn told_of(&self, error: LoadError, aside: Option<&TempDir>, what: &Attachment) -> AttachError {
@@ -393,7 +433,7 @@ impl Project {
         let plain = |mut p: crate::Problem| {
             if let Some(rest) = p.place.strip_prefix(&own) {
                 let field = rest.split_once(['.', ':']).map_or("", |(_, field)| field.trim());
-                p.place = field.trim_start_matches("shows.").to_owned();
+                p.place = field.trim_start_matches("slices[0].").replace("shows.", "");
             }
             p.place = given.say(&p.place);
             p.message = given.say(&p.message);
@@ -751,7 +791,9 @@ impl Project {
             None if names.is_empty() => "nothing is: --list shows what is there".into(),
             None => format!("there are {}", shorten(&names.join(", "))),
         };
-        let (short, member) = (shorten(name), shorten(member));
+        let scene = self.load(&Job::default()).ok();
+        let member = shorten(scene.as_ref().map_or(member, |scene| scene.name_of(member)));
+        let short = shorten(name);
         format!("{place}: \"{short}\" is not attached to \"{member}\": {hint}")
     }
 

@@ -194,7 +194,9 @@ fn syntax_problem(name: &str, text: &str, error: &SpannedError) -> Problem {
     use ron::Error as E;
     let (line, column) = (error.span.start.line, error.span.start.col);
     let decimal = decimal_comma(text, line, column);
+    let curly = curly_quote(text, line, column);
     let remedy = match &error.code {
+        _ if curly.is_some() => curly.unwrap_or_default(),
         _ if decimal.is_some() => decimal.unwrap_or_default(),
         E::NoSuchStructField { expected, found, .. }
         | E::NoSuchEnumVariant { expected, found, .. } => match nearest(found, expected) {
@@ -218,6 +220,16 @@ fn syntax_problem(name: &str, text: &str, error: &SpannedError) -> Problem {
         .map(|c| if c.is_control() { ' ' } else { c })
         .collect();
     Problem::error(format!("{name}:{line}:{column}"), "SYNTAX", format!("{what}; {remedy}"))
+}
+
+/// What to do about a quote that a word processor has bent, where the reader stumbled over it: no
+/// text that is quoted as it should be ends there.
+fn curly_quote(text: &str, line: usize, column: usize) -> Option<String> {
+    const BENT: [char; 7] = ['“', '”', '„', '«', '»', '‘', '’'];
+    let line: Vec<char> = text.lines().nth(line.checked_sub(1)?)?.chars().take(10_000).collect();
+    let near = column.saturating_sub(2)..(column + 1).min(line.len());
+    let bent = line.get(near)?.iter().find(|c| BENT.contains(c))?;
+    Some(format!("{bent} is a bent quote of a word processor: write straight ones, \""))
 }
 
 /// What to do about a decimal comma, where the reader stumbled behind one: digits, a comma, digits.

@@ -18,13 +18,67 @@ const LONGEST: usize = 60;
 /// `(field: …)`, and arrays of a fixed length as `(x, y, z)`.
 #[must_use]
 pub fn schema() -> Value {
+    let bare = of_scene();
+    let examples = Reference::of_scene(&bare).values;
+    exemplified(bare.clone(), "Scene", &examples)
+}
+
+fn of_scene() -> Value {
     schemars::schema_for!(SceneFile).to_value()
 }
 
 /// JSON Schema of `evidence.ron`, written as that of scenes.
 #[must_use]
 pub fn evidence_schema() -> Value {
+    let bare = of_evidence();
+    let examples = Reference::of_evidence(&bare).values;
+    exemplified(bare.clone(), "Evidence", &examples)
+}
+
+fn of_evidence() -> Value {
     schemars::schema_for!(evidence::EvidenceFile).to_value()
+}
+
+/// A schema whose fields have the examples of the page.
+fn exemplified(mut schema: Value, whole: &str, examples: &BTreeMap<Field, Value>) -> Value {
+    for ((name, variant, field), example) in examples {
+        let node = match name == whole {
+            true => Some(&mut schema),
+            false => schema.get_mut("$defs").and_then(|types| types.get_mut(name)),
+        };
+        let inside = match (variant.as_str(), node) {
+            ("", node) => node,
+            (variant, Some(node)) => {
+                let variants = node.get_mut("oneOf").and_then(Value::as_array_mut);
+                variants
+                    .into_iter()
+                    .flatten()
+                    .find_map(|v| v.get_mut("properties")?.get_mut(variant))
+            }
+            _ => None,
+        };
+        let at = inside.and_then(|node| node.get_mut("properties")?.get_mut(field));
+        if let Some(at) = at.and_then(Value::as_object_mut) {
+            at.insert("examples".to_owned(), Value::Array(vec![example.clone()]));
+        }
+    }
+    schema
+}
+
+/// A value with the digits that were meant: scenes hold single precision.
+fn meant(value: &Value) -> Value {
+    match value {
+        Value::Number(number) if !number.is_u64() && !number.is_i64() => {
+            let single = number.as_f64().filter(|v| f64::from(*v as f32) == *v);
+            let short = single.and_then(|v| (v as f32).to_string().parse::<f64>().ok());
+            short.and_then(serde_json::Number::from_f64).map_or(value.clone(), Value::Number)
+        }
+        Value::Array(items) => items.iter().map(meant).collect(),
+        Value::Object(fields) => {
+            fields.iter().map(|(name, value)| (name.clone(), meant(value))).collect()
+        }
+        other => other.clone(),
+    }
 }
 
 /// The page of every field, Markdown: what it is, its unit, what counts where it is left out, and
@@ -38,7 +92,7 @@ pub fn page() -> String {
          stands for the rest. [Evidence](#evidence), `evidence.ron` beside a scene, follows after \
          the scene's own fields.\n",
     );
-    let (scene, evidence) = (schema(), evidence_schema());
+    let (scene, evidence) = (of_scene(), of_evidence());
     let mut said = BTreeSet::new();
     for reference in [Reference::of_scene(&scene), Reference::of_evidence(&evidence)] {
         for (name, node) in reference.in_order() {
@@ -61,6 +115,8 @@ struct Reference<'a> {
     root: &'a Value,
     types: &'a Map<String, Value>,
     examples: BTreeMap<Field, String>,
+    /// The same as JSON.
+    values: BTreeMap<Field, Value>,
 }
 
 impl<'a> Reference<'a> {
@@ -81,7 +137,8 @@ impl<'a> Reference<'a> {
     fn of(whole: &'static str, schema: &'a Value, examples: &[Value]) -> Self {
         static NONE: std::sync::LazyLock<Map<String, Value>> = std::sync::LazyLock::new(Map::new);
         let types = schema.get("$defs").and_then(Value::as_object).unwrap_or(&NONE);
-        let mut reference = Self { whole, root: schema, types, examples: BTreeMap::new() };
+        let mut reference =
+            Self { whole, root: schema, types, examples: BTreeMap::new(), values: BTreeMap::new() };
         for example in examples {
             reference.gather(whole, schema, example);
         }
@@ -146,6 +203,7 @@ impl<'a> Reference<'a> {
             if !says_nothing(value) && at.get("default") != Some(value) {
                 let key = (name.to_owned(), variant.to_owned(), field.clone());
                 let text = self.ron(at, value);
+                self.values.entry(key.clone()).or_insert_with(|| meant(value));
                 self.examples.entry(key).or_insert(text);
             }
             self.gather(inner, of, value);
@@ -448,6 +506,23 @@ mod tests {
         assert!(scale.contains("`(1, 1, 1)`"), "{scale}");
         let section = line("| `section` |");
         assert!(section.contains("Rectangle(depth_m: "), "{section}");
+    }
+
+    /// Editors show them; a list of a type is no field of it.
+    #[test]
+    fn the_schema_has_the_examples_of_the_page() {
+        let (scene, evidence) = (schema(), evidence_schema());
+        let of = |schema: &Value, path: &str| {
+            schema.pointer(path).and_then(|p| p["examples"].get(0)).cloned().unwrap_or_default()
+        };
+        assert_eq!(of(&evidence, "/$defs/Record/properties/date"), "2026-05-03");
+        let cover = evidence["$defs"]["Finding"]["oneOf"].as_array().unwrap();
+        let crack = cover.iter().find(|v| v["properties"].get("Crack").is_some()).unwrap();
+        let width = &crack["properties"]["Crack"]["properties"]["width_mm"]["examples"][0];
+        assert_eq!(*width, 0.3);
+        assert!(of(&scene, "/properties/title").is_string(), "{scene}");
+        let fields = scene.to_string().matches("\"examples\"").count();
+        assert!(fields > 200, "{fields}");
     }
 
     /// A number without a unit says what it counts; a length, a force, an angle says its unit.

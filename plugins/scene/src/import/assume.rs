@@ -197,13 +197,15 @@ const INSIDE: f64 = 0.7;
 const LINES: usize = 60;
 const POINTS: usize = 9;
 
-/// Whether a cage about a member's axis lies in its concrete: that of a ring's segment, whose
-/// section is bent, does not.
+/// Whether a straight cage about a member's axis lies in its concrete: those of an arch, and of a
+/// ring's segment, whose section is bent, do not.
 pub(super) fn fits(reinforcement: &Reinforcement, frame: Frame, surface: &Surface) -> bool {
     let triangles: Vec<parametric::Triangle> =
         surface.faces().map(|t| t.map(|p| p.as_vec3())).collect();
     let lines = parametric::lines_in(frame, &triangles, reinforcement);
-    if !lines.iter().any(|line| line.part == Part::Bar) {
+    let mut bars = lines.iter().filter(|line| line.part == Part::Bar).peekable();
+    // Bent ones leave the cubes that a member is computed as for less than a step, and are refused.
+    if bars.peek().is_none() || bars.any(|bar| bar.line.len() > 2) {
         return false;
     }
     let [mut all, mut within] = [0.0; 2];

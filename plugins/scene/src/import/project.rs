@@ -133,7 +133,7 @@ impl Bare {
             Self::Open => "its surface is open, so that nobody knows what lies in it",
             Self::Thin => "there is no room for bars with their cover",
             Self::Outside => {
-                "the section is bent or broken, and bars along the axis would lie outside of it"
+                "it is bent or its section is, and straight bars along the axis would lie outside of it"
             }
         }
     }
@@ -564,7 +564,9 @@ fn summary(folder: &Path, source: &Source, built: &Built, members: &[Detail]) ->
             built.steel.loose
         ));
     }
-    if built.found.is_empty() {
+    // A glTF file's own reader may have said it.
+    let is_told = notes.iter().any(|note| note.contains("no structural members"));
+    if built.found.is_empty() && !is_told {
         notes.push("no structural members were found: name nodes COL_…, BEAM_…, SLAB_…, WALL_…, FOOTING_…, LINING_…".into());
     }
     Imported {
@@ -674,7 +676,7 @@ fn rules(
 - **Concrete** of {} of {all} members ({known}): C12/15 before 1950, C20/25 before 1972, C25/30 before 2001, C30/37 since and where no year is known. This is a rule of Intrados, of no code.\n\
 - **Exposure** of {}: XC4 (wet and dry in turn), XC2 for footings and piles (EN 206, table 1). Salt is not assumed: give `--exposure \"XC4, XD3\"` where it comes.\n\
 - **Age** of {}: {YEARS} years.\n\
-- **Reinforcement** of {}: the least that EN 1992-1-1 allows, {STEEL}: beams §9.2.1.1 and §9.2.2, slabs and footings §9.3.1.1, columns §9.5.2 and §9.5.3, walls and linings §9.6, piles §9.8.5; cover of table 4.4N (structural class S4) and Δc_dev = 10 mm. Bars and links follow the surface along the axis of their member; where they would not lie in it, none are assumed, and Remarks say so. Real members have more: their bars are what to look for first.\n\
+- **Reinforcement** of {}: the least that EN 1992-1-1 allows, {STEEL}: beams §9.2.1.1 and §9.2.2, slabs and footings §9.3.1.1, columns §9.5.2 and §9.5.3, walls and linings §9.6, piles §9.8.5; cover of table 4.4N (structural class S4) and Δc_dev = 10 mm. Bars are straight, and slant as their member tapers; where they would not lie in it, as in an arch, none are assumed, and Remarks say so. Real members have more: their bars are what to look for first.\n\
 - **Steel grade** of {} bars: {STEEL}.\n\
 - **Supports**: the ground holds footings (springs of 50 MPa/m), tunnels (springs of 40 MPa/m), columns and walls that nothing reaches up to, and the lowest slabs. Every other member is held for itself, `alone`, what stands at its foot, what lies under both ends; the whole (`analyze --whole`) leaves those supports out. **Loads**: {}.\n",
         imported.concrete_assumed,

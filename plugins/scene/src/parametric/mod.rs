@@ -44,6 +44,20 @@ pub fn template(kind: &str) -> Option<&'static str> {
     })
 }
 
+/// Evidence to go with a [`template`] that is written as the scene `name`: one example of every
+/// kind as comments, so that nothing is said yet.
+#[must_use]
+pub fn evidence_template(kind: &str, name: &str) -> Option<String> {
+    let id = match kind {
+        "column" => "C1",
+        "beam" => "B1",
+        "tunnel" => "T1",
+        _ => return None,
+    };
+    let plain = |c: char| if c.is_control() { ' ' } else { c };
+    Some(file::evidence::beside(&name.chars().map(plain).collect::<String>(), id))
+}
+
 /// Writes a scene as GLB, its members in `extras.intrados`: concrete, bars, stirrups and tendons
 /// are nodes of their own.
 ///

@@ -50,6 +50,11 @@ impl Date {
         Self::of_number(self.number() + days)
     }
 
+    /// Its year.
+    pub(crate) fn year(self) -> i32 {
+        self.year
+    }
+
     /// Today, in Greenwich.
     #[must_use]
     pub fn today() -> Self {

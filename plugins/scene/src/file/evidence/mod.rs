@@ -407,6 +407,14 @@ pub(crate) fn skeleton(name: &str, id: &str) -> String {
     SKELETON.replace("NAME", name).replace("C1", id)
 }
 
+/// The same for a scene `NAME.ron` alone, which no command writes.
+pub(crate) fn beside(name: &str, id: &str) -> String {
+    skeleton(name, id).replace(
+        "Every command that reads the scene beside this file reads it, too.\n// `intrados attach` and `intrados detach` write here; `intrados schema --page`",
+        "Every command that reads that scene reads this file, too.\n// `intrados attach` writes evidence.ron beside it; `intrados schema --page`",
+    )
+}
+
 const SKELETON: &str = include_str!("skeleton.ron");
 
 /// The examples of the skeleton as evidence.
@@ -547,7 +555,10 @@ mod tests {
         assert_eq!(parse("e.ron", &skeleton("bridge.ifc", "P/1")).unwrap(), empty);
         let file = parse("e.ron", &examples()).unwrap();
         assert_eq!(check(&file), []);
-        assert_eq!([file.items.len(), file.tables.len(), file.slices.len()], [5, 3, 2]);
+        assert_eq!([file.items.len(), file.tables.len(), file.slices.len()], [15, 4, 2]);
+        let kinds: std::collections::BTreeSet<_> =
+            file.items.iter().map(|item| item.shows.kind()).collect();
+        assert_eq!(kinds.len(), 14, "one of every kind: {kinds:?}");
         assert_eq!(file.photographs.len(), 1);
         assert_eq!([file.tests.len(), file.gauges.len(), file.readings.len()], [1, 1, 1]);
     }

@@ -213,7 +213,7 @@ impl<'a> Placing<'a> {
             let message = format!(
                 "\"{}\" is there twice on {}: choose another name",
                 shorten(name),
-                shorten(member)
+                shorten(self.scene.name_of(member))
             );
             self.error(place, "DUPLICATE", message);
         }
@@ -417,7 +417,7 @@ impl<'a> Placing<'a> {
         if let Some((name, area)) = area(&what.shows).filter(|(_, area)| *area > surface) {
             let message = format!(
                 "{area} m² are more than the surface of {}, {surface:.1} m²: in m²?",
-                what.member
+                called(&self.scene.members[index])
             );
             return self.error(record.field(name), "UNIT", message);
         }
@@ -456,7 +456,8 @@ impl<'a> Placing<'a> {
         let wrong = |message: String| Err(("height_m", "RANGE", message));
         let tall = member.bounds[1].y - member.bounds[0].y;
         if let Some(height) = record.height_m.filter(|h| *h > tall * (1.0 + SAME_PLACE)) {
-            return wrong(format!("{height} m is above {}, which is {tall:.2} m tall", member.id));
+            let name = called(member);
+            return wrong(format!("{height} m is above {name}, which is {tall:.2} m tall"));
         }
         // Of what stands, a height is a place on the axis, too.
         let rise = member.frame.axis.y;
@@ -549,7 +550,7 @@ impl<'a> Placing<'a> {
             None => {
                 self.warnings.push(format!(
                     "{name} of {}: chloride as % of concrete is counted with {usual} kg of cement in {mass} kg, since nobody says how much there is; give percent_of_cement, or the concrete's hydration",
-                    member.id
+                    called(member)
                 ));
                 mass / usual
             }

@@ -442,10 +442,12 @@ impl<'a> Table<'a> {
         }
         let [holds] = told[..] else {
             let message = if told.is_empty() {
-                match self.strange.first() {
-                    Some(name) => unknown_column(name),
-                    None => format!("no column says what was measured: name {KINDS}"),
-                }
+                let strange = match &self.strange[..] {
+                    [] => String::new(),
+                    [one] => format!(", and \"{}\" is not known here", shorten(one)),
+                    all => format!(", and {} are not known here", shorten(&all.join(", "))),
+                };
+                format!("no column says what was measured{strange}: name {KINDS}")
             } else {
                 format!("more than one column says what was measured: keep {KINDS}")
             };
@@ -666,10 +668,8 @@ impl<'a> Table<'a> {
         let largest = values().fold(0.0, f64::max);
         let hardly = unit == GaugeUnit::MicroStrain && largest > 0.0 && largest < LEAST_STRAIN;
         hardly.then(|| {
-            let message = format!(
-                "none is above {} ue, less than any gauge can tell: in m/m? give the unit m/m",
-                1e6 * LEAST_STRAIN
-            );
+            let message =
+                "none is above 0.05 ue, less than any gauge can tell: in m/m? give the unit m/m";
             let place = format!("{}: column {}", self.file, Column::Value.name());
             Problem::error(place, "UNIT", message)
         })
@@ -728,7 +728,7 @@ fn mistaken(name: &str) -> Option<String> {
 /// Names of potentials that say no unit.
 const POTENTIALS: [&str; 6] = ["potential", "potential_mv", "half_cell", "half-cell", "e", "v"];
 
-/// What to do about a column of which nobody knows the name.
+/// What to do about a column that [`mistaken`] finds.
 fn unknown_column(name: &str) -> String {
     let names: Vec<&str> = COLUMNS.iter().map(|(name, _)| *name).collect();
     let lower = name.to_ascii_lowercase();
@@ -745,13 +745,8 @@ fn unknown_column(name: &str) -> String {
             "the column \"{short}\" says no unit: give potentials in mV, and call it so"
         );
     }
-    match nearest(name, &names) {
-        Some(known) => format!("there is no column \"{short}\": did you mean {known}?"),
-        None => format!(
-            "there is no column \"{short}\": take it out; what was measured is {KINDS}, and \
-             beside it may stand along, face, angle_deg, height_m, date, std_error, test"
-        ),
-    }
+    let known = nearest(name, &names).unwrap_or("along");
+    format!("there is no column \"{short}\": did you mean {known}?")
 }
 
 /// A row of a table.
