@@ -281,7 +281,8 @@ fn observations(photo: &Photographed, surface: &Surface, faces: &[ReadFace]) -> 
 fn seen_of(face: &Face, read: &[ReadFace]) -> FaceSeen {
     let [width, height] = [face.across, face.along].map(|[from, to]| to - from);
     let of_it = || read.iter().filter(|r| r.seen.face.name == face.name);
-    let seen: f64 = of_it().flat_map(|r| r.reading.seen_m2).sum();
+    // The sum of nothing is -0.
+    let seen = 0.0 + of_it().flat_map(|r| r.reading.seen_m2).sum::<f64>();
     FaceSeen {
         face: face.name.clone(),
         seen: (seen / (width * height).max(1e-9)).clamp(0.0, 1.0),
