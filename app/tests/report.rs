@@ -14,7 +14,7 @@ const SCENE: &str = r#"(
     project: (structure: "Bridge 7", owner: "The county", inspected: "2025-01-01"),
     members: [
         (id: "C1", body: Column(section: Rectangle(width_m: 0.4, depth_m: 0.4), height_m: 3), concrete: "C30/37", exposure: (class: "XC4", years: 30)),
-        (id: "B1", body: Beam(section: Rectangle(width_m: 0.3, depth_m: 0.6), length_m: 6), at: (4, 3, 0), concrete: "C30/37", exposure: (class: "XC4", years: 30)),
+        (id: "B1", body: Beam(section: Rectangle(width_m: 0.3, depth_m: 0.6), length_m: 6), at: (4, 3, 0), turn_deg: 31, concrete: "C30/37", exposure: (class: "XC4", years: 30)),
         (id: "B2", body: Beam(section: Rectangle(width_m: 0.3, depth_m: 0.6), length_m: 6), at: (4, 3, 4), concrete: "C30/37", exposure: (class: "XC4", years: 30)),
     ],
 )"#;
@@ -84,6 +84,19 @@ fn the_command_fills_the_cover() {
     }
     assert!(!cover.contains("The county") && !cover.contains("<city>"));
     assert_eq!(predicted(&[]).1["basis"]["project"]["owner"], "The county");
+}
+
+/// A skewed girder was as wide as its box in the world's axes.
+#[test]
+fn a_skewed_member_has_its_own_measures() {
+    let (page, json, _) = predicted(&[]);
+    let rests = &json["basis"]["members"][1];
+    assert_eq!(rests["size"], "6.00 m long, 0.60 × 0.30 m across, 1.08 m³");
+    let across: Vec<f64> = serde_json::from_value(rests["across_m"].clone()).unwrap();
+    let mut sides = across.clone();
+    sides.sort_by(f64::total_cmp);
+    assert!((sides[0] - 0.3).abs() < 1e-3 && (sides[1] - 0.6).abs() < 1e-3, "{across:?}");
+    assert!(page.contains("3.00 m high, 0.40 × 0.40 m across"));
 }
 
 #[test]

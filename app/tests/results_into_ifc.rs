@@ -33,6 +33,9 @@ fn results_go_into_a_copy_of_the_model_with_data() {
     };
     let ([before, _, bars], [after, ours, kept]) = (sets(&model), sets(&written));
     assert_eq!([after, ours, kept], [before + 1, 1, bars]);
+    // A label has at most 255 characters.
+    let text_of = fs::read_to_string(&written).unwrap();
+    assert!(text_of.contains("'Advice',$,IFCTEXT(") && !text_of.contains("'Advice',$,IFCLABEL("));
     let again = at("again.ifc");
     fs::copy(&written, &again).unwrap();
     assert_eq!(predict(&again).0, Some(0));

@@ -14,7 +14,7 @@ use intrados_damage::{
     evidence::Cause,
     ledger::Group,
     verdict::{Basis, NAMED},
-    zone::place,
+    zone::{Zones, place},
 };
 use intrados_forecast::FORECAST;
 use intrados_gauges::{GAUGES, GaugeReading};
@@ -95,11 +95,11 @@ struct Rust {
     percent: f64,
 }
 
-/// What one source says of one cause.
+/// What one source says.
 struct Says<'a> {
     source: &'a str,
-    cause: &'static str,
-    worst: String,
+    /// Causes of damage, and that of the worst zone.
+    causes: Vec<(&'static str, String)>,
     basis: &'a str,
 }
 
@@ -145,6 +145,8 @@ struct Alike<'a> {
 /// What became of the evidence of a member.
 struct Items<'a> {
     member: &'a str,
+    /// What else is said of it.
+    note: String,
     /// Source, items, verdict, and whether they are used.
     rows: Vec<(&'a str, String, String, bool)>,
 }
@@ -379,7 +381,8 @@ impl<'a> Page<'a> {
             let row = (word(first.source), name, files(&first.verdict()), first.used);
             match all.last_mut().filter(|(id, _)| *id == first.member) {
                 Some((_, items)) => items.rows.push(row),
-                None => all.push((&first.member, Items { member, rows: vec![row] })),
+                None => all
+                    .push((&first.member, Items { member, note: String::new(), rows: vec![row] })),
             }
         }
         let is_forecast_alone = |items: &Items| matches!(items.rows.as_slice(), [(source, _, _, true)] if *source == FORECAST);
@@ -387,9 +390,8 @@ impl<'a> Page<'a> {
             all.into_iter().map(|(_, items)| items).partition(is_forecast_alone);
         let names: Vec<&str> = alone.iter().map(|items| items.member).collect();
         if !names.is_empty() {
-            let names = format!("lives of {}: {}", many(names.len(), "member"), names.join(", "));
-            let row = (FORECAST, names, "used".to_owned(), true);
-            rest.push(Items { member: "Forecast alone", rows: vec![row] });
+            let note = format!(" of {}, used: {}", many(names.len(), "member"), names.join(", "));
+            rest.push(Items { member: "Forecast alone", note, rows: Vec::new() });
         }
         rest
     }
@@ -491,22 +493,17 @@ impl<'a> Page<'a> {
         })
     }
 
-    /// What each source says of each cause; its name and basis stand once.
+    /// What each source says of each cause.
     fn says<'m>(&self, m: &'m MemberPrediction) -> Vec<Says<'m>> {
-        let mut rows = Vec::new();
-        for (source, e) in &m.evidence {
-            for (k, (cause, zones)) in e.zones.iter().enumerate() {
-                rows.push(Says {
-                    source: if k == 0 { word(source) } else { "" },
-                    cause: cause.name(),
-                    worst: zones
-                        .worst()
-                        .map_or_else(|| NOTHING.into(), |(_, worst)| plus_minus(worst)),
-                    basis: if k == 0 { &e.basis } else { "" },
-                });
-            }
-        }
-        rows
+        let worst = |zones: &Zones| {
+            zones.worst().map_or_else(|| NOTHING.into(), |(_, worst)| plus_minus(worst))
+        };
+        let one = |(source, e): (&&'static str, &'m Evidence)| Says {
+            source: word(source),
+            causes: e.zones.iter().map(|(cause, zones)| (cause.name(), worst(zones))).collect(),
+            basis: &e.basis,
+        };
+        m.evidence.iter().map(one).collect()
     }
 
     /// What gauges measured, beside what a sound member would show.
