@@ -323,3 +323,35 @@ fn what_is_to_be_inspected_is_of_normal_priority() {
     assert!(topic.title.contains("nothing found") && topic.description.contains("Inspect:"));
     assert!(!topic.description.contains("as poor"), "{}", topic.description);
 }
+
+/// Other programs know a crack again after the next inspection.
+#[test]
+fn a_defect_that_is_found_again_keeps_its_topic() {
+    let again = r#"(
+            member: "2O2Fr$t4X7Zf8NOew3FLOH", name: "crack, later", date: "2027-05-02", along: 0.5, angle_deg: 90,
+            shows: Crack(width_mm: 0.6, course: Across),
+        ),
+    ],
+)"#;
+    let later = EVIDENCE.trim_end().trim_end_matches(')').trim_end().trim_end_matches("],");
+    let guids = |evidence: &str| {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        std::fs::write(at("scene.ron"), SCENE).unwrap();
+        std::fs::write(at("evidence.ron"), evidence).unwrap();
+        let scene = Scene::load(&at("scene.ron"), &Job::default()).unwrap();
+        let settings = PredictSettings { forecast: None, ..PredictSettings::default() };
+        let prediction = predict(&scene, settings, &Sources::default(), &Job::default()).unwrap();
+        let basis = Basis::of(&scene);
+        let bytes = bcf(&scene, &prediction, &basis, "", Version::V2_1).unwrap();
+        let topics = topics(&unpacked(&bytes), Version::V2_1);
+        let defects = topics.into_values().filter(|(topic, _)| topic.kind == "Defect");
+        let mut found: Vec<(String, String)> = defects.map(|(t, _)| (t.guid, t.title)).collect();
+        found.sort();
+        found
+    };
+    let [before, after] = [guids(EVIDENCE), guids(&format!("{later}{again}"))];
+    let ids = |found: &[(String, String)]| found.iter().map(|f| f.0.clone()).collect::<Vec<_>>();
+    assert_eq!((before.len(), ids(&before)), (2, ids(&after)));
+    assert!(after.iter().any(|(_, title)| title.contains("0.60 mm (2027)")), "{after:?}");
+}

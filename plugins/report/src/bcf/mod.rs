@@ -158,7 +158,10 @@ impl Teller<'_> {
     /// of (RFC 9562, version 8), so that other programs know it again after the next inspection.
     fn guid(&self, told: &Told, what: &str) -> String {
         let kind = TYPES[usize::from(told.defect.is_none())];
-        let item = told.defect.map(|d| (d.kind, &d.item));
+        // What was found again is still what was found first.
+        let first =
+            |d: &Defect| d.course.first().map_or_else(|| d.item.clone(), |f| f.item.clone());
+        let item = told.defect.map(|d| (d.kind, first(d)));
         let key = json!([self.prediction.scene, told.member.id, kind, item, what]).to_string();
         let mut bytes = [0; 16];
         bytes.copy_from_slice(&blake3::hash(key.as_bytes()).as_bytes()[..16]);
