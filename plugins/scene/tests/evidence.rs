@@ -194,7 +194,7 @@ fn faults_are_named_with_their_place_and_remedy() {
         ("slices: [(member: \"C1\", slices: [])],".into(), "evidence.ron: slices[0].slices", "Files"),
         ("slices: [(member: \"C1\", slices: [Drawn(name: \"d\", count: 1, size: 64, pixel_mm: 1)])],".into(), "evidence.ron: slices[0].slices[0]", "no evidence"),
         ("slices: [(member: \"C1\", slices: [Files(name: \"d\", images: [\"no.tif\"])])],".into(), "evidence.ron: slices[0]: no.tif", "check the path"),
-        ("slices: [(member: \"X9Y\", slices: [Files(name: \"d\", images: [\"no.tif\"])])],".into(), "evidence.ron: slices[0].member", "there are B1, C1, T1"),
+        ("slices: [(member: \"X9Y\", slices: [Files(name: \"d\", images: [\"no.tif\"])])],".into(), "evidence.ron: slices[0].member", "there are \"B1\", \"C1\", \"T1\""),
         ("gauges: [(name: \"SG1\", member: \"C1\", along: 0.5, angle_deg: 0, measures: Strain(Axial))],".into(), "evidence.ron: gauges[0].name", "already"),
         ("gauges: [(name: \"G\", member: \"C1\", along: 5, angle_deg: 0, measures: Strain(Axial))],".into(), "evidence.ron: gauges[0].along", "0 to 1"),
         ("tests: [(name: \"truck\", member: \"C1\", actions: [SelfWeight])],".into(), "evidence.ron: tests[0].name", "already"),

@@ -130,10 +130,10 @@ enum Bare {
 impl Bare {
     fn why(self) -> &'static str {
         match self {
-            Self::Open => "its surface is open, so that nobody knows what lies in it",
+            Self::Open => "nobody knows what lies in an open surface",
             Self::Thin => "there is no room for bars with their cover",
             Self::Outside => {
-                "it is bent or its section is, and straight bars along the axis would lie outside of it"
+                "straight bars along the axis would lie outside of what is bent, or has a bent section"
             }
         }
     }
@@ -603,7 +603,7 @@ fn bare(members: &[Detail]) -> Vec<String> {
             n => format!("{n} members"),
         };
         format!(
-            "no bars are assumed for {count}, since {} ({named}{more}): give reinforcement in details of scene.ron",
+            "no bars are assumed for {count}: {} ({named}{more}); give reinforcement in details of scene.ron",
             why.why()
         )
     };

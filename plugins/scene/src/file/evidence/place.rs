@@ -312,7 +312,7 @@ impl<'a> Placing<'a> {
 
     /// Refuses what a gauge on its member does not read; SI.
     fn sound(&mut self, place: String, gauge: &Gauge, value: f64) {
-        let percent = 100.0 * value.abs();
+        let percent = (1e6 * value.abs()).round() / 1e4;
         let why = match gauge.measures {
             Measures::Strain(_) if percent > MOST_STRAIN => Some(format!(
                 "{value} is a strain of {percent} %, at which nothing is left: it is in m/m, 1e-6 for a millionth"

@@ -132,7 +132,7 @@ impl GaugeUnit {
 
     /// Why a gauge on a structure does not read so much.
     fn absurd(self, shown: f64) -> Option<String> {
-        let percent = 100.0 * self.si() * shown.abs();
+        let percent = (1e6 * self.si() * shown.abs()).round() / 1e4;
         match self {
             Self::Strain if percent > MOST_STRAIN => Some(format!(
                 "{shown} m/m is a strain of {percent} %, at which nothing is left: in ue? give the unit ue"
@@ -447,7 +447,16 @@ impl<'a> Table<'a> {
                     [one] => format!(", and \"{}\" is not known here", shorten(one)),
                     all => format!(", and {} are not known here", shorten(&all.join(", "))),
                 };
-                format!("no column says what was measured{strange}: name {KINDS}")
+                let nearly = self.strange.iter().find_map(|name| {
+                    let near = |known: &&str| edit_distance(name, known) <= 1;
+                    COLUMNS.iter().map(|(name, _)| *name).find(near)
+                });
+                match nearly {
+                    Some(known) => {
+                        format!("no column says what was measured{strange}: did you mean {known}?")
+                    }
+                    None => format!("no column says what was measured{strange}: name {KINDS}"),
+                }
             } else {
                 format!("more than one column says what was measured: keep {KINDS}")
             };
