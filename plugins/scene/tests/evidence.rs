@@ -200,7 +200,7 @@ fn faults_are_named_with_their_place_and_remedy() {
         ("tests: [(name: \"truck\", member: \"C1\", actions: [SelfWeight])],".into(), "evidence.ron: tests[0].name", "already"),
         ("tests: [(name: \"t\", member: \"C1\", actions: [])],".into(), "evidence.ron: tests[0].actions", "nothing acts"),
         ("readings: [(of: \"SG2\", value: 1, std_error: 1)],".into(), "evidence.ron: readings[0].of", "did you mean SG1?"),
-        ("readings: [(of: \"SG1\", test: \"bus\", value: 1, std_error: 1)],".into(), "evidence.ron: readings[0].test", "add it to `tests`"),
+        ("readings: [(of: \"SG1\", test: \"bus\", value: 1e-6, std_error: 1e-6)],".into(), "evidence.ron: readings[0].test", "add it to `tests`"),
         ("readings: [(of: \"SG1\", value: 1, std_error: 0)],".into(), "evidence.ron: readings[0].std_error", "above 0"),
     ] {
         let place_of: Place = Place::new(&body);
@@ -378,7 +378,7 @@ fn faults_of_tables_are_named_with_line_and_column() {
         ("", b"along,mW\n0.1,-300\n", "t.csv:1", "did you mean mV?"),
         ("", b"along,cover\n0.1,30\n", "t.csv:1", "cover_mm"),
         ("", b"along,potential\n0.1,30\n", "t.csv:1", "in mV"),
-        ("", b"along,quality of the weather\n0.1,30\n", "t.csv:1", "take it out"),
+        ("", b"along,quality of the weather\n0.1,30\n", "t.csv:1", "is not known here"),
         ("", b"along,face\n0.1,Front\n", "t.csv:1", "what was measured"),
         ("", b"mV,cover_mm\n-300,30\n", "t.csv:1", "more than one"),
         ("", b"mV,mV\n-300,30\n", "t.csv:1", "twice"),
