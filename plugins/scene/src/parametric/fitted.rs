@@ -239,9 +239,10 @@ mod tests {
         let r = reinforcement();
         let arch = |z: f32| 1.5 - (z - 4.0).powi(2) / 10.0;
         let haunch = |z: f32| 0.8 - 0.1 * z.min(4.0);
-        for (height, depth) in
-            [(&arch as &dyn Fn(f32) -> f32, &(|_| 0.4) as &dyn Fn(f32) -> f32), (&|_| 0.0, &haunch)]
-        {
+        let (level, even) = (|_: f32| 0.0_f32, |_: f32| 0.4_f32);
+        type Course<'a> = &'a dyn Fn(f32) -> f32;
+        let cases: [(Course, Course); 2] = [(&arch, &even), (&level, &haunch)];
+        for (height, depth) in cases {
             let lines = lines_in(frame(), &bent(height, depth), &r);
             assert_eq!(lines.iter().filter(|l| l.part == Part::Bar).count(), 6);
             assert!(lines.iter().filter(|l| l.part == Part::Stirrup).count() > 30);
