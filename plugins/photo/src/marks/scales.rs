@@ -167,14 +167,15 @@ mod tests {
     use super::*;
 
     /// A sure line across the left half of a picture of two regions, and crumbs that are half sure
-    /// in the right one: `close` and `far` as the network might have seen them at each scale.
+    /// in the right one, as the network might have seen them at each scale.
     fn looks(width: usize, height: usize, sure: [f32; SCALES]) -> Vec<Marks> {
         let look = |k: usize| {
             let (w, h) = (width >> k, height >> k);
             let chance = |i: usize| {
                 let (x, y) = (i % w, i / w);
                 let crumb = x > w / 2 && (x >> 2) % 3 == 0 && (y >> 2) % 3 == 0;
-                if y == h / 2 && x < w / 2 { sure[k] } else { 0.3 * f32::from(u8::from(crumb)) }
+                let is_line = y.abs_diff(h / 2) <= 4 >> k && x < w / 2;
+                if is_line { sure[k] } else { 0.3 * f32::from(u8::from(crumb)) }
             };
             let crack = Grid { width: w, height: h, data: (0..w * h).map(chance).collect() };
             Marks {
@@ -193,7 +194,7 @@ mod tests {
         let regions = Regions::of([width, height]);
         assert_eq!(regions.number(), 2);
         for (sure, expected) in
-            [([0.99, 0.99, 0.99], 0), ([0.1, 0.99, 0.97], 1), ([0.1, 0.3, 0.99], 2)]
+            [([0.99, 0.99, 0.99], 0), ([0.2, 0.996, 0.6], 1), ([0.1, 0.3, 0.99], 2)]
         {
             let mut looks = looks(width, height, sure);
             let marks = Marks::together(looks.clone(), &known);

@@ -48,11 +48,11 @@ use crate::{
 
 use together::{Gathered, part_of};
 
-/// What all lives of a scene may take, as [`MarchSettings::work`] counts it: an hour or so on two
+/// What all lives of a scene may take, as [`MarchSettings::work`] counts it: some 25 minutes on two
 /// cores, if every life takes its share; few do.
 ///
 /// [`MarchSettings::work`]: intrados_mechanics::model::MarchSettings::work
-const WORK: f64 = 6e9;
+const WORK: f64 = 2e9;
 /// What one life may take at least, about 15 CPU-seconds, and at most, about 40 minutes.
 const LEAST_WORK: f64 = 1e7;
 const MOST_WORK: f64 = 1.5e9;
