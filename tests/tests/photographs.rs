@@ -128,9 +128,10 @@ fn a_photograph_becomes_evidence() {
     // Its mouth is told as wide as planted at its widest; it swells and shrinks by some tenths.
     assert!((width - WIDTH_MM).abs() < 0.35 * WIDTH_MM, "{widest:?}");
     let told = member.photographed().unwrap();
-    assert!(told.contains("% of Front (cracks from") && told.contains("% of Right"), "{told}");
-    assert!(told.contains("nothing of Back, Left: what is there is unknown"), "{told}");
-    // Two of four faces were seen: elsewhere than at the crack the rest of the error is there.
+    assert!(told.contains("% of Front (cracks from"), "{told}");
+    // The right face is seen flatter than 10°.
+    assert!(told.contains("nothing of Back, Right, Left: what is there is unknown"), "{told}");
+    // One of four faces was seen: elsewhere than at the crack the rest of the error is there.
     let concrete = member.causes[&intrados_damage::Cause::Concrete].0;
     let far = concrete[1].unwrap();
     assert!(far.value < 0.1 && far.std_error > 0.06, "{far:?}");
