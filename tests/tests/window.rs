@@ -986,3 +986,33 @@ fn a_photograph_is_placed_by_its_corners_and_becomes_evidence() {
     assert!(photo.file.starts_with(folder.path()) && photo.member == "P");
     assert_eq!(std::fs::read_to_string(&photo.picks).unwrap().lines().count(), 7);
 }
+
+/// A file as the system hands it over that is let go over the window.
+#[derive(Debug)]
+struct Dropped(std::path::PathBuf);
+
+impl egui::DroppedFile for Dropped {
+    fn path(&self) -> &Path {
+        &self.0
+    }
+
+    fn bytes(&self) -> Result<Vec<u8>, String> {
+        std::fs::read(&self.0).map_err(|e| e.to_string())
+    }
+}
+
+/// An IFC model that is let go over the window is imported, and its members stand in the list.
+#[test]
+#[ignore = "needs INTRADOS_DATA, and ifcopenshell"]
+fn an_ifc_model_is_dropped_on_the_window_with_data() {
+    let data = std::env::var_os("INTRADOS_DATA").expect("INTRADOS_DATA");
+    let folder = tempfile::tempdir().unwrap();
+    let model = folder.path().join("bridge.ifc");
+    std::fs::copy(Path::new(&data).join("ifc/infra-bridge.ifc"), &model).unwrap();
+    let mut window = Window::new(|_| {});
+    window.frame();
+    window.harness.input_mut().dropped_files.push(std::sync::Arc::new(Dropped(model)));
+    window.until("the imported scene", |w| w.contains_resource::<CurrentScene>());
+    assert_eq!(window.with(|w| w.resource::<CurrentScene>().0.members.len()), 37);
+    window.until_seen("Members");
+}
