@@ -105,6 +105,9 @@ pub fn page() -> String {
     page
 }
 
+/// Values of fields that no bundled scene uses.
+const REST: &str = include_str!("example.ron");
+
 /// Where a field is: its type, the variant of it (empty for a struct), its name.
 type Field = (String, String, String);
 
@@ -122,7 +125,7 @@ struct Reference<'a> {
 impl<'a> Reference<'a> {
     fn of_scene(schema: &'a Value) -> Self {
         let templates = ["column", "beam", "tunnel"].into_iter().filter_map(template);
-        let texts = bundled().iter().map(|(_, text)| *text).chain(templates);
+        let texts = bundled().iter().map(|(_, text)| *text).chain(templates).chain([REST]);
         let scenes =
             texts.filter_map(|t| serde_json::to_value(parse("", t).ok()?).ok()).collect::<Vec<_>>();
         Self::of("Scene", schema, &scenes)
@@ -493,6 +496,14 @@ mod tests {
             let missing: Vec<_> = inside.chain([node]).flat_map(silent).collect();
             assert!(missing.is_empty(), "{name}: {missing:?}");
         }
+    }
+
+    #[test]
+    fn what_no_bundled_scene_uses_has_an_example_that_can_be_read() {
+        parse("", REST).unwrap();
+        let page = page();
+        let bare: Vec<&str> = page.lines().filter(|l| l.ends_with("|  |")).collect();
+        assert!(bare.iter().all(|l| l.starts_with("| `face` |")), "{bare:?}");
     }
 
     #[test]
