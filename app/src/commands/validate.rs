@@ -8,6 +8,7 @@ use intrados_scene::{
     Assembly, ErrorKind, Part, Problem, Scene, Severity, SteelLine, gltf,
     structure::{Observation, Shows},
 };
+use intrados_survey::only_of_rust;
 use serde::Serialize;
 
 use super::render::MapRows;
@@ -158,17 +159,7 @@ fn why_unheard(assembly: &Assembly, observation: &Observation) -> Option<(&'stat
         let why = format!("the member is of {}, and is read as if that were concrete", matter.name);
         return Some(("NOT_CONCRETE", why));
     }
-    let of_rust = matches!(
-        shows,
-        Shows::Cover { .. }
-            | Shows::HalfCell { .. }
-            | Shows::Chloride { .. }
-            | Shows::Carbonation { .. }
-            | Shows::Rust { .. }
-            | Shows::Efflorescence { .. }
-            | Shows::WetSpot { .. }
-    );
-    if !of_rust {
+    if !only_of_rust(shows) {
         return None;
     }
     let not_used = |why: String| Some(("NOT_USED", format!("not used, because {why}")));

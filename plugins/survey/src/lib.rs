@@ -11,4 +11,5 @@ mod strength;
 mod weighed;
 
 pub use again::found_again;
+pub use rust::only_of_rust;
 pub use weighed::*;

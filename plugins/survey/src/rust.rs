@@ -226,7 +226,8 @@ impl Weighed {
 }
 
 /// Whether it says nothing of anything but rust.
-fn only_of_rust(shows: &Shows) -> bool {
+#[must_use]
+pub fn only_of_rust(shows: &Shows) -> bool {
     matches!(
         shows,
         Shows::Cover { .. }
