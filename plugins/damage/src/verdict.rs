@@ -89,9 +89,9 @@ impl Looked {
 
     /// By what is said of a member: a place counts as looked at where somebody measured or saw it,
     /// and not where the word of another place reaches. A crack that was measured was found, and so
-    /// was a damage that the profile does not call sound.
+    /// was a damage that the profile does not call sound, and a defect that somebody has listed.
     #[must_use]
-    pub fn of(profile: &Profile, evidence: &[&Evidence]) -> Self {
+    pub fn of(profile: &Profile, evidence: &[&Evidence], is_listed: bool) -> Self {
         let measured = || evidence.iter().filter(|e| e.measured);
         let own = |e: &Evidence, zone: usize| {
             e.zones.iter().any(|(cause, zones)| {
@@ -106,7 +106,8 @@ impl Looked {
             zones.iter().flatten().any(|d| d.value >= profile.damaged_from())
         };
         let found = |e: &Evidence| e.crack_width_mm.is_some_and(|w| w > 0.0) || damaged(e);
-        Self { found: measured().any(|e| found(e)), unseen: unseen as f64 / ZONES as f64 }
+        let found = is_listed || measured().any(|e| found(e));
+        Self { found, unseen: unseen as f64 / ZONES as f64 }
     }
 }
 
@@ -460,7 +461,7 @@ mod tests {
             }
             e.unwrap()
         };
-        let of = |e: &Evidence| Looked::of(&profile, &[e]);
+        let of = |e: &Evidence| Looked::of(&profile, &[e], false);
         assert_eq!(of(&said(0.0, true)), Looked { found: false, unseen: 0.7 });
         assert_eq!(of(&said(0.3, true)), Looked { found: true, unseen: 0.7 });
         assert_eq!(of(&said(0.3, false)), Looked::NOWHERE);

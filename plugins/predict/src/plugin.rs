@@ -320,8 +320,7 @@ fn judged(all: &AllEvidence, profile: &Profile, found: bool) -> Option<Predicted
     let evidence: Vec<&Evidence> =
         evidence.into_iter().filter(|e| whole.counted.contains(e.source)).collect();
     let basis = Basis::by_zone(&evidence);
-    let looked = Looked::of(profile, &evidence);
-    let looked = Looked { found: looked.found || found, ..looked };
+    let looked = Looked::of(profile, &evidence, found);
     let cracks = profile.cracks(&evidence);
     let verdict = Verdict::of(profile, Some(damage), &cracks, Basis::of(&basis), looked);
     Some(Predicted {

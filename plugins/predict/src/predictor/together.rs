@@ -190,8 +190,7 @@ impl Predictor {
         let nothing = Shown::default();
         let photographed = self.photographed.get(&index).unwrap_or(&nothing);
         let defects = defects(scene, &member.id, photographed, &self.readings[index]);
-        let looked = Looked::of(profile, &said);
-        let looked = Looked { found: looked.found || !defects.is_empty(), ..looked };
+        let looked = Looked::of(profile, &said, !defects.is_empty());
         let cracks = profile.cracks(&said);
         let verdict = Verdict::of(profile, damage, &cracks, Basis::of(&zone_basis), looked);
         let widest = evidence
