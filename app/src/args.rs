@@ -731,6 +731,11 @@ pub(crate) struct Analyze {
     /// of a scene, 1e-8 of a deck if absent
     #[arg(long, value_name = "R", value_parser = tolerance)]
     pub(crate) tolerance: Option<f64>,
+    /// After their life, raise loads of members until these fail, and beyond: --to-failure=NAME
+    /// this load of the scene, --to-failure alone all forces, pressures and displacements (not
+    /// weight and heat); what each bears, where its bars yield, how it fails
+    #[arg(long, value_name = "LOAD", num_args = 0..=1, require_equals = true, default_missing_value = "")]
+    pub(crate) to_failure: Option<String>,
     /// What keeps cracks from depending on the mesh: bands of one element (any element), or the
     /// implicit gradient (elements of at most half of --length)
     #[arg(long, value_name = "HOW", default_value = "band")]

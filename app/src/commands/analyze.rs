@@ -16,6 +16,7 @@ use intrados_mechanics::{
     model::{self, MarchSettings, Regularisation},
     read::{self, ReadError},
     skin::{Looking, Seen},
+    strength::{Along, CurvePoint, Strength},
 };
 use intrados_scene::{Assembly, Scene, SurfaceDamage, SurfaceFile};
 use intrados_stage::{
@@ -64,6 +65,8 @@ struct Work {
     /// BLAKE3 of the files.
     hash: String,
     is_scene: bool,
+    /// Names of the scene's loads that may be raised until members fail.
+    loads: Vec<String>,
     prepared: Vec<Prepared>,
     /// Beginnings of the names of their files, by id.
     names: BTreeMap<String, String>,
@@ -90,6 +93,9 @@ pub(crate) fn run(session: &Session, args: &args::Analyze) -> Result<Outcome, Fa
         };
         work.prepared.iter_mut().for_each(|p| p.model.crack(cracks));
     }
+    if let Some(load) = &args.to_failure {
+        work.raise(load)?;
+    }
     let begin = cpu_seconds();
     let Some(out) = &args.out else {
         let lives = work.prepared.iter().enumerate().map(|(i, prepared)| {
@@ -109,6 +115,7 @@ pub(crate) fn run(session: &Session, args: &args::Analyze) -> Result<Outcome, Fa
         args.length,
         args.crack_law,
         args.whole,
+        &args.to_failure,
         args.units.map(|u| format!("{u:?}")),
     );
     let (mut files, lives) = output::in_parts(session, out, &key, |files| {
@@ -191,6 +198,36 @@ impl Work {
         MarchSettings { tolerance: args.tolerance.unwrap_or(usual.tolerance), ..usual }
     }
 
+    /// Raises a load of the scene, or all that may be, until members fail.
+    fn raise(&mut self, load: &str) -> Result<(), Failure> {
+        if !self.is_scene {
+            let why = "--to-failure is for scenes: a deck's steps say what acts";
+            return Err(Failure::Usage(why.into()));
+        }
+        let known: Vec<&str> = self.loads.iter().map(String::as_str).collect();
+        if !load.is_empty() && !known.contains(&load) {
+            let known = if known.is_empty() { "none".into() } else { known.join(", ") };
+            let why = format!("--to-failure={load}: the scene's loads that can be raised: {known}");
+            return Err(Failure::Usage(why));
+        }
+        let names = if load.is_empty() { known } else { vec![load] };
+        let mut any = false;
+        for prepared in &mut self.prepared {
+            let raised = prepared.raise(&names, Along::Automatic);
+            any |= raised;
+            if !raised {
+                prepared.notes.push("none of the loads that are raised acts on it".into());
+            }
+        }
+        match any {
+            true => Ok(()),
+            false => Err(Failure::BadInput(format!(
+                "{}: no force, pressure or displacement acts on what is to be raised to failure: add a load to the scene",
+                self.name
+            ))),
+        }
+    }
+
     /// What is done when model `i` is computed.
     fn label(&self, i: usize) -> String {
         format!("{} ({} of {})", self.prepared[i].id, i + 1, self.prepared.len())
@@ -254,7 +291,9 @@ fn scene(session: &Session, args: &args::Analyze) -> Result<Work, Failure> {
     let prepared = chosen.map(made).collect::<Result<Vec<_>, Failure>>()?;
     let names =
         known.iter().map(|id| (*id).to_owned()).zip(file_names(&Vec::from_iter(&known))).collect();
-    Ok(Work { name: scene.name, hash: scene.hash, is_scene: true, prepared, names })
+    let loads = structure.loads.iter().filter(|l| l.action.can_be_raised());
+    let loads = loads.map(|l| l.name.clone()).collect();
+    Ok(Work { name: scene.name, hash: scene.hash, is_scene: true, loads, prepared, names })
 }
 
 /// The assembly that somebody calls so, by id or name.
@@ -337,6 +376,7 @@ fn deck(args: &args::Analyze, kind: &str) -> Result<Work, Failure> {
         name,
         hash: blake3::hash(&bytes).to_hex().to_string(),
         is_scene: false,
+        loads: Vec::new(),
     })
 }
 
@@ -357,6 +397,11 @@ fn drawn_life(
     let folder = files.folder().to_owned();
     let cannot = |e| not_written(&folder, e);
     life.write_steps(&files.place(format!("{name}.csv"))).map_err(cannot)?;
+    if let Some(strength) = &life.strength {
+        strength.write_curve(&files.place(format!("{name}-strength.csv"))).map_err(cannot)?;
+        let plot = files.place(format!("{name}-strength.svg"));
+        strength.plot_curve(&plot, &prepared.id).map_err(cannot)?;
+    }
     for drawn in pictures.finish().map_err(cannot)? {
         files.place(drawn.file_name().unwrap_or_default().to_string_lossy());
     }
@@ -485,6 +530,7 @@ impl Report {
                 m.steps.len()
             );
             m.cracks.iter().for_each(|cracks| text += &format!("  cracks: {cracks}\n"));
+            m.strength.iter().for_each(|strength| text += &bears(strength));
             let loose = m.steps.iter().filter(|s| !s.converged && s.residual.is_finite());
             if let Some(worst) = loose.clone().map(|s| s.residual).reduce(f64::max) {
                 text += &format!(
@@ -502,6 +548,24 @@ impl Report {
         self.files.iter().for_each(|f| text += &format!("file {f}\n"));
         text
     }
+}
+
+/// What a member bears, in lines.
+fn bears(strength: &Strength) -> String {
+    let at = |p: &CurvePoint| {
+        let [kn, mm] = [1e-3 * p.load_n, 1e3 * p.displacement_m];
+        format!("{kn:.1} kN at {mm:.2} mm (factor {:.3})", p.load_factor)
+    };
+    let mut text = format!("  raised: {}\n", strength.loads.join(", "));
+    strength.yielding.iter().for_each(|y| text += &format!("  a bar yields first at {}\n", at(y)));
+    text += &format!("  it bears {}\n", at(&strength.peak));
+    text += &format!("  failure: {}: {}\n", strength.mode.words(), strength.because);
+    if let Some(ultimate) = &strength.ultimate {
+        let ductility =
+            strength.ductility.map_or(String::new(), |d| format!(", ductility {d:.1}"));
+        text += &format!("  a fifth is lost at {}{ductility}\n", at(ultimate));
+    }
+    text + &format!("  followed until {}\n", strength.ended)
 }
 
 /// The most memory that this process has held, where the system says.

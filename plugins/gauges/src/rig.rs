@@ -293,6 +293,7 @@ fn testing(scene: &Scene, tests: &[&Test]) -> Scene {
                 members: vec![test.member.clone()],
                 action: action.clone(),
                 history,
+                loading: None,
             });
         }
     }
@@ -333,12 +334,7 @@ fn stiffen(model: &mut Model) {
         (steel.rust, steel.bond) = (None, None);
         match &steel.kind {
             SteelKind::Tendon(t) => {
-                steel.kind = SteelKind::Bar(Bar {
-                    modulus: t.strand.modulus,
-                    yielding: f64::MAX,
-                    hardening: 0.0,
-                    kinematic: 0.0,
-                })
+                steel.kind = SteelKind::Bar(Bar::elastic(t.strand.modulus));
             }
             SteelKind::Stressed(bar, _) => steel.kind = SteelKind::Bar(*bar),
             SteelKind::Bar(_) => {}

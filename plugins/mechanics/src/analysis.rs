@@ -18,8 +18,9 @@ use crate::{
         CONDUCTED, Drive, Failure, History, March, MarchSettings, Point, Steel, SteelKind, Step,
         System,
     },
+    strength::{self, CurvePoint, Strength},
     tensor::{Principal, Voigt, rotate_stress},
-    write::{Field, Grid, Series, csv},
+    write::{self, Curve, Field, Grid, Series, csv},
 };
 
 pub(crate) use crate::limits::Stability;
@@ -49,6 +50,9 @@ pub struct Outcome {
     pub complaint: String,
     /// How near its loads came to buckling; none: nothing is pressed, or nobody could tell.
     pub stability: Option<Stability>,
+    /// What it bears, where loads are raised after its life.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub strength: Option<Strength>,
     /// What a user must know before believing any of it.
     pub warnings: Vec<String>,
     /// What a user should know.
@@ -218,6 +222,7 @@ pub fn analyze(
         tolerance: settings.tolerance,
         complaint: String::new(),
         stability: None,
+        strength: None,
         warnings: prepared.warnings.clone(),
         notes: prepared.notes.clone(),
     };
@@ -227,13 +232,20 @@ pub fn analyze(
     // A first moment at the beginning is a step of no duration: what is there takes its loads.
     for (i, &time) in prepared.times.iter().enumerate() {
         job.step(i, prepared.times.len())?;
-        let result = march.advance(time, 0.0, job, |history, step| {
-            let points = structure.all_points(history)?;
-            limits.see(&structure, history, step, &points, step.time >= last, job)?;
-            outcome.take(prepared, history, step, &points);
-            steel.take(&structure, history)?;
-            observer.see(&structure, history, step, &points)
-        });
+        let result = loop {
+            let result = march.advance(time, 0.0, job, |history, step| {
+                let points = structure.all_points(history)?;
+                limits.see(&structure, history, step, &points, step.time >= last, job)?;
+                outcome.take(prepared, history, step, &points);
+                steel.take(&structure, history)?;
+                observer.see(&structure, history, step, &points)
+            });
+            if result.is_err() || march.history.turned || !limits.needs_second_order() {
+                break result;
+            }
+            // From here on, and at this moment already.
+            march.history.turned = true;
+        };
         match result {
             Ok(()) => {}
             Err(Failure::Beyond(why)) => {
@@ -262,8 +274,20 @@ pub fn analyze(
             Err(other) => return Err(other),
         }
     }
-    outcome.warnings.extend(limits.warnings());
     outcome.stability = limits.nearest;
+    if let Some(raised) = prepared.raised.as_ref().filter(|_| outcome.complaint.is_empty()) {
+        let start = march.history.clone();
+        let each = |history: &History, step: &Step, points: &[[Point; 8]]| {
+            observer.see(&structure, history, step, points)
+        };
+        let settings = strength::settings(settings);
+        let (found, end) =
+            strength::raise(&structure, prepared, raised, start, settings, job, each)?;
+        (outcome.strength, march.history) = (Some(found), end);
+    }
+    let (warnings, notes) = limits.told();
+    outcome.warnings.extend(warnings);
+    outcome.notes.extend(notes);
     if march.fell_back() {
         outcome
             .warnings
@@ -579,6 +603,37 @@ impl Observer for Pictures {
             self.error = self.draw(structure, history, step, points).err();
         }
         Ok(())
+    }
+}
+
+impl Strength {
+    /// Writes its curve as a table.
+    ///
+    /// # Errors
+    /// As [`csv`].
+    pub fn write_curve(&self, path: &Path) -> Result<(), WriteError> {
+        let row = |p: &CurvePoint| [p.displacement_m, p.load_factor, p.load_n, p.residual];
+        let rows: Vec<[f64; 4]> = self.curve.iter().map(row).collect();
+        csv(path, &["displacement_m", "load_factor", "load_n", "residual"], &rows)
+    }
+
+    /// Draws its curve.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn plot_curve(&self, path: &Path, title: &str) -> Result<(), WriteError> {
+        let points = |of: &[CurvePoint]| {
+            of.iter().map(|p| (1e3 * p.displacement_m.abs(), 1e-3 * p.load_n)).collect()
+        };
+        let curve = |name: &str, of: &[CurvePoint], marked| Curve {
+            name: name.into(),
+            points: points(of),
+            marked,
+        };
+        let mut curves = vec![curve("load", &self.curve, false)];
+        curves.extend(self.yielding.map(|y| curve("a bar yields", &[y], true)));
+        curves.push(curve(&format!("peak: {}", self.mode.words()), &[self.peak], true));
+        write::plot(path, title, ["displacement of the loaded nodes, mm", "load, kN"], &curves)
     }
 }
 

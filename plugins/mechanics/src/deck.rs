@@ -118,6 +118,8 @@ impl Case {
             self.notes.push("stresses of shells are not reported: their displacements are".into());
         }
         let times = self.steps.iter().map(|s| s.1).collect();
+        let reach = mesh.bounds().map_or(DVec3::ZERO, |[low, high]| high - low);
+        let longest = DVec3::AXES[reach.max_position()];
         let corrosion = Err("a deck says nothing of exposure".into());
         Prepared {
             id: id.into(),
@@ -126,6 +128,8 @@ impl Case {
             times,
             parts,
             axis: None,
+            direction: longest,
+            raised: None,
             gauges: Vec::new(),
             warnings: Vec::new(),
             corrosion,

@@ -6,6 +6,7 @@ pub mod frame;
 pub mod member;
 pub mod plugin;
 pub mod skin;
+pub mod strength;
 
 // What every body is computed with.
 pub(crate) mod heat;

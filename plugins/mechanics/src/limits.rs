@@ -14,9 +14,12 @@ use crate::{
 /// reinforced beams and columns end below a fiftieth of their length; at a twentieth sections have
 /// turned by .05 to .1, and what was a member lies broken, whatever forces balance.
 const LARGEST: f64 = 0.05;
-/// Loads over those of buckling from which second order counts (EN 1992-1-1, 5.8.2 (6): it adds a
-/// tenth).
-const SECOND_ORDER: f64 = 0.1;
+/// Loads over those of buckling of the sound elastic member from which second order is computed.
+/// EN 1992-1-1, 5.8.2 (6) lets it be left out where it adds less than a tenth; cracks and creep may
+/// take three quarters of the stiffness.
+const SECOND_ORDER: f64 = 0.025;
+/// The same, from which a user is told where it is not computed.
+const TOLD: f64 = 0.1;
 /// Below this, loads may double before buckling is looked at anew.
 const FAR: f64 = 0.03;
 /// By so much compression grows between two looks from there on.
@@ -45,6 +48,8 @@ pub(crate) struct Limits {
     pub(crate) nearest: Option<Stability>,
     /// The largest displacement, over the length.
     pub(crate) moved: f64,
+    /// Since when second order is computed, s.
+    since: Option<f64>,
 }
 
 impl Limits {
@@ -65,6 +70,7 @@ impl Limits {
             looked: [0.0; 2],
             nearest: None,
             moved: 0.0,
+            since: None,
         }
     }
 
@@ -122,28 +128,41 @@ impl Limits {
         Ok(())
     }
 
-    /// What a user should know of it.
-    pub(crate) fn warnings(&self) -> Vec<String> {
-        let mut warnings = Vec::new();
-        if let Some(Stability { load_over_critical: share, time_s }) =
-            self.nearest.filter(|s| s.load_over_critical > SECOND_ORDER)
-        {
-            let day = time_s / DAY;
-            warnings.push(if share < 1.0 {
-                format!(
-                    "its loads are {share:.2} of those under which it buckles (day {day:.0}): second order, which is not computed, makes deflections \
-                     some {:.0} % larger (EN 1992-1-1, 5.8.2)",
-                    100.0 * share / (1.0 - share)
-                )
-            } else {
-                format!("its loads are {share:.2} times those under which it buckles (day {day:.0}): its displacements are those of a structure that cannot")
-            });
+    /// Whether loads have come so near to buckling that second order counts. A deck of elastic
+    /// bodies asks for a theory of small displacements, and gets it.
+    pub(crate) fn needs_second_order(&mut self) -> bool {
+        let near = self.nearest.filter(|s| s.load_over_critical > SECOND_ORDER && !self.elastic);
+        self.since = self.since.or(near.map(|s| s.time_s));
+        near.is_some()
+    }
+
+    /// Warnings, and what a user should know of it.
+    pub(crate) fn told(&self) -> (Vec<String>, Vec<String>) {
+        let (mut warnings, mut notes) = (Vec::new(), Vec::new());
+        let [share, day] =
+            self.nearest.map_or([0.0; 2], |s| [s.load_over_critical, s.time_s / DAY]);
+        if let Some(since) = self.since {
+            notes.push(format!(
+                "its loads are up to {share:.2} of those under which it buckles (day {day:.0}): from day {:.0} on equilibrium is found where things \
+                 have moved to (second order; bricks and the steel in them turn, joints and springs do not)",
+                since / DAY
+            ));
+        } else if share >= 1.0 {
+            warnings.push(format!(
+                "its loads are {share:.2} times those under which it buckles (day {day:.0}): its displacements are those of a structure that cannot"
+            ));
+        } else if share > TOLD {
+            warnings.push(format!(
+                "its loads are {share:.2} of those under which it buckles (day {day:.0}): second order, which is not computed, makes deflections some \
+                 {:.0} % larger (EN 1992-1-1, 5.8.2)",
+                100.0 * share / (1.0 - share)
+            ));
         }
         if self.moved > LARGEST && self.elastic {
             let share = 1.0 / self.moved;
             warnings.push(format!("its parts move by 1/{share:.1} of its length: displacements are computed as if they were small"));
         }
-        warnings
+        (warnings, notes)
     }
 }
 

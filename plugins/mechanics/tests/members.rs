@@ -155,6 +155,7 @@ fn imported_on(upright: u32, open: bool) -> Scene {
             members: Vec::new(),
             action,
             history: vec![(3.0, 0.0), (4.0, 1.0)],
+            loading: None,
         }],
         ..Structure::default()
     };

@@ -83,6 +83,8 @@ fn beam() -> Prepared {
         times,
         parts: vec![part],
         axis: None,
+        direction: DVec3::X,
+        raised: None,
         gauges: vec![],
         corrosion: Err(String::new()),
         attacked: 0.0,

@@ -13,7 +13,7 @@ use crate::{
 
 /// Steel that does not yield.
 pub(super) fn elastic(modulus: f64) -> Bar {
-    Bar { modulus, yielding: f64::MAX, hardening: 0.0, kinematic: 0.0 }
+    Bar::elastic(modulus)
 }
 
 /// Pieces of a region's embedded bars, each with the stress before the first step.

@@ -228,6 +228,7 @@ pub(super) fn own_weight() -> Load {
         members: Vec::new(),
         action: Action::SelfWeight,
         history: Vec::new(),
+        loading: None,
     }
 }
 

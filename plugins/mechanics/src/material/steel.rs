@@ -16,6 +16,8 @@ pub struct Bar {
     pub hardening: f64,
     /// Share of hardening that is kinematic, 0 to 1.
     pub kinematic: f64,
+    /// Plastic strain at which it breaks; infinite: not known.
+    pub rupture: f64,
 }
 
 /// What a bar remembers.
@@ -37,7 +39,14 @@ impl Bar {
     /// If the yield stress is not between 50 and 3000 MPa.
     pub fn new(yielding: f64) -> Result<Self, Error> {
         checked("yield stress", yielding, 50.0 * MPA, 3000.0 * MPA, "50 MPa to 3000 MPa (in Pa)")?;
-        Ok(Self { modulus: 200e9, yielding, hardening: 2e9, kinematic: 1.0 })
+        Ok(Self { modulus: 200e9, yielding, hardening: 2e9, kinematic: 1.0, rupture: f64::INFINITY })
+    }
+
+    /// One that never yields, of a modulus in Pa.
+    #[must_use]
+    pub const fn elastic(modulus: f64) -> Self {
+        let rupture = f64::INFINITY;
+        Self { modulus, yielding: f64::MAX, hardening: 0.0, kinematic: 0.0, rupture }
     }
 
     /// Stress (Pa), ∂stress/∂strain and the state at the end, by return mapping.
@@ -84,6 +93,9 @@ impl Relaxation {
         }
     }
 }
+
+/// Strain at the largest force of prestressing steel, at least (EN 10138-1).
+const RUPTURE: f64 = 0.035;
 
 /// Prestressing steel.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -133,6 +145,13 @@ impl Strand {
             "300 MPa up to the strength",
         )?;
         Ok(())
+    }
+
+    /// Slope beyond the proof stress, Pa: up to f_pk at ε_uk = .035 (EN 1992-1-1 figure 3.10, with
+    /// the strain of EN 10138).
+    #[must_use]
+    pub(crate) fn hardening(&self) -> f64 {
+        (self.strength - self.proof) / (RUPTURE - self.proof / self.modulus)
     }
 
     /// Largest stress while jacking, min(.8 f_pk, .9 f_p0.1k), and right after, min(.75 f_pk, .85

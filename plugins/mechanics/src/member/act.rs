@@ -5,12 +5,13 @@ use std::collections::BTreeMap;
 use glam::DVec3;
 use intrados_scene::structure::{self, Body as Shape, GroundModel, Hold, Place};
 
-use super::{Draft, MemberError, body::LINING, warmth::Air};
+use super::{Draft, MemberError, body::LINING, raised_by, warmth::Air};
 use crate::{
     element::spring::Winkler,
     material::{DAY, YEAR},
     mesh::HexFace,
     model::{Action, Bedding, Ground, JACKING, Load, SteelKind},
+    strength::{Along, Raised},
 };
 
 /// How long the ground takes to press on a lining, s.
@@ -161,6 +162,21 @@ impl Draft<'_> {
             self.notes.push("nothing loads this member: only shrinkage acts".into());
         }
         Ok(())
+    }
+
+    /// Loads that the scene raises until the member fails, by the first one's way.
+    pub(super) fn raised(&self) -> Option<Raised> {
+        let loads = self.scene.structure.loads.iter().filter(|l| l.loading.is_some());
+        let names: Vec<&str> = loads.clone().map(|l| l.name.as_str()).collect();
+        let along = match loads.clone().find_map(|l| l.loading)? {
+            structure::Loading::Automatic => Along::Automatic,
+            structure::Loading::Displacement { to_mm } => {
+                Along::Displacement(to_mm.map(|mm| 1e-3 * f64::from(mm)))
+            }
+            structure::Loading::ArcLength => Along::ArcLength,
+        };
+        let loads = raised_by(&self.model, &names);
+        (!loads.is_empty()).then_some(Raised { loads, along })
     }
 
     fn action(&mut self, load: &structure::Load) -> Result<Option<Action>, MemberError> {

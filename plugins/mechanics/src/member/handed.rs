@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 
 use glam::{DMat3, DVec3};
 
-use super::{Draft, GRAVITY, MemberError};
+use super::{Draft, FROM_WHOLE, GRAVITY, MemberError};
 use crate::model::{Action, Load};
 
 /// Nodes whose smallest moment of inertia is less than this share of the largest cannot take a
@@ -98,7 +98,7 @@ impl Draft<'_> {
             }
             if !sums.is_empty() {
                 self.model.loads.push(Load {
-                    name: format!("{}, from the whole", load.name),
+                    name: format!("{}{FROM_WHOLE}", load.name),
                     action: Action::Nodes(sums.into_iter().collect()),
                     history: load.history.clone(),
                 });

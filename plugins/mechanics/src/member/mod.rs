@@ -33,6 +33,7 @@ use crate::{
     },
     model::{Failure, Gauge, Model},
     prestress::PrestressError,
+    strength::{Along, Raised},
 };
 
 /// How finely a member is cut.
@@ -58,6 +59,10 @@ pub struct Prepared {
     pub parts: Vec<Part>,
     /// A point of the axis and its direction, where it has one to go round.
     pub axis: Option<[DVec3; 2]>,
+    /// Along the member, of length 1.
+    pub direction: DVec3,
+    /// Loads that are raised after its life until it fails.
+    pub raised: Option<Raised>,
     /// Gauges by name.
     pub gauges: Vec<(String, Gauge)>,
     /// What a user must know before believing what comes of it: what was given and is not used.
@@ -69,6 +74,31 @@ pub struct Prepared {
     /// What a user should know: assumptions, and what was left out.
     pub notes: Vec<String>,
 }
+
+impl Prepared {
+    /// Raises loads after its life until it fails, whatever the scene says: those of the scene's
+    /// `names`, as they act on it directly and through the rest of the structure. False: none of
+    /// them acts on it.
+    pub fn raise(&mut self, names: &[&str], along: Along) -> bool {
+        let loads = raised_by(&self.model, names);
+        let acts = !loads.is_empty();
+        if acts {
+            self.raised = Some(Raised { loads, along });
+        }
+        acts
+    }
+}
+
+/// Numbers of a model's loads that come from these of the scene.
+fn raised_by(model: &Model, names: &[&str]) -> Vec<usize> {
+    let comes = |name: &str| {
+        names.iter().any(|n| name == *n || name.strip_suffix(FROM_WHOLE) == Some(*n))
+    };
+    (0..model.loads.len()).filter(|&l| comes(&model.loads[l].name)).collect()
+}
+
+/// What is added to the name of a load that comes through the rest of the structure.
+pub(crate) const FROM_WHOLE: &str = ", from the whole";
 
 /// One member within a model: a column, a lining, a segment.
 #[derive(Debug, Clone, PartialEq)]
@@ -316,9 +346,12 @@ impl<'a> Draft<'a> {
         let axis = self.is_tunnel().then_some([self.axes.start, self.axes.unit[2]]);
         let begin = times.first().copied().unwrap_or(0.0);
         let attacked = self.birth();
+        let (raised, direction) = (self.raised(), self.axes.unit[2]);
         Ok(Prepared {
             id: self.id(),
             axis,
+            direction,
+            raised,
             model: self.model,
             begin,
             times,

@@ -103,7 +103,9 @@ impl Draft<'_> {
             };
             let bar = Bar::new(f64::from(grade.yield_mpa) * 1e6)
                 .map_err(|source| MemberError::Material { id, source })?;
-            let bar = Bar { hardening: f64::from(grade.hardening_mpa()) * 1e6, ..bar };
+            let rupture = grade.ductility.map_or(f64::INFINITY, |[_, strain]| f64::from(strain));
+            let hardening = f64::from(grade.hardening_mpa()) * 1e6;
+            let bar = Bar { hardening, rupture, ..bar };
             let diameter = f64::from(line.diameter);
             let bond = self.bond(line, diameter);
             let rust = skin.map(|skin| skin.rust(diameter, &pieces));

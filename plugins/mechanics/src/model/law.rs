@@ -156,8 +156,9 @@ pub(super) struct Answer {
     pub(super) tangent: Tangent,
     /// What concrete remembers at the end of the step.
     pub(super) state: Option<Record>,
-    /// Opening of the widest crack, m.
+    /// Opening of the widest crack, m, and across which it opens.
     pub(super) crack: f64,
+    pub(super) normal: [f64; 3],
     /// Local equivalent strain of tension.
     pub(super) local: f64,
 }
@@ -242,7 +243,14 @@ impl Law {
                 let free =
                     tensor::isotropic(law.expansion * (moment.temperature[1] - moment.neutral));
                 let stress = tensor::apply(tangent, &tensor::sub(strain, &free));
-                Answer { stress, tangent: **tangent, state: None, crack: 0.0, local: 0.0 }
+                Answer {
+                    stress,
+                    tangent: **tangent,
+                    state: None,
+                    crack: 0.0,
+                    normal: [0.0; 3],
+                    local: 0.0,
+                }
             }
             (Self::Concrete(law), memory) => {
                 let born;
@@ -281,6 +289,7 @@ impl Law {
                     tangent: response.tangent,
                     state: Some(record),
                     crack,
+                    normal: response.crack_normal,
                     local,
                 }
             }

@@ -171,12 +171,27 @@ impl Steel {
                     let locked = if share < 1.0 { f64::NAN } else { strain };
                     return (stress, 0.0, Piecework { locked, stress, ..*before });
                 }
+                let strand = &tendon.strand;
                 let relaxed = before.relaxed
-                    + tendon.strand.relax(before.stress, before.relaxed, span[1] - span[0]);
-                let stress = tendon.stress[piece]
-                    + tendon.strand.modulus * (strain - before.locked)
-                    - relaxed;
-                (stress, slope, Piecework { relaxed, stress, ..*before })
+                    + strand.relax(before.stress, before.relaxed, span[1] - span[0]);
+                let strained = strain - before.locked - before.bar.plastic;
+                let trial = tendon.stress[piece] + strand.modulus * strained - relaxed;
+                // Beyond the proof stress it hardens; plastic strain is kept as that of a bar is.
+                let slower = strand.modulus * strand.hardening()
+                    / (strand.modulus - strand.hardening());
+                let over = trial - strand.proof - slower * before.bar.accumulated;
+                if over <= 0.0 {
+                    return (trial, slope, Piecework { relaxed, stress: trial, ..*before });
+                }
+                let flow = over / (strand.modulus + slower);
+                let bar = BarState {
+                    plastic: before.bar.plastic + flow,
+                    accumulated: before.bar.accumulated + flow,
+                    ..before.bar
+                };
+                let stress = trial - strand.modulus * flow;
+                let slope = if slope > 0.0 { strand.hardening() } else { 0.0 };
+                (stress, slope, Piecework { relaxed, stress, bar, ..*before })
             }
         }
     }

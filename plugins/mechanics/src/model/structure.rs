@@ -89,6 +89,8 @@ pub struct Point {
     pub damage: [f64; 2],
     /// Opening of the widest crack, m.
     pub crack: f64,
+    /// Across which it opens, of length 1.
+    pub normal: [f64; 3],
 }
 
 impl<'m> System<'m> {
@@ -274,7 +276,7 @@ impl<'m> System<'m> {
     }
 
     /// Adds `factor` times the forces of an action.
-    pub(super) fn add_load(
+    pub(crate) fn add_load(
         &self,
         action: &Action,
         factor: f64,
@@ -546,7 +548,8 @@ impl<'m> System<'m> {
             let u = self.moved(hex, trial.history, &trial.history.x)?.local;
             self.brick(hex, trial, &u, &mut modes, |point, answer| {
                 let damage = answer.state.map_or([0.0; 2], |record| record.state.damage);
-                points[point] = Point { stress: answer.stress, damage, crack: answer.crack };
+                let (stress, crack, normal) = (answer.stress, answer.crack, answer.normal);
+                points[point] = Point { stress, damage, crack, normal };
             })?;
         }
         Ok(points)

@@ -364,7 +364,7 @@ mod tests {
         model::{Body, Drive, Load, March, MarchSettings, Model},
     };
 
-    const STEEL: Bar = Bar { modulus: 200e9, yielding: f64::MAX, hardening: 0.0, kinematic: 0.0 };
+    const STEEL: Bar = Bar::elastic(200e9);
 
     fn solve(model: &Model, time: f64) -> History {
         let structure = System::new(model).unwrap();

@@ -126,7 +126,7 @@ pub(super) fn truss(job: &Job) -> Checks {
     let nodes = vec![DVec3::new(-2.0, 0.0, half), DVec3::new(2.0, 0.0, half), DVec3::ZERO];
     let rods = vec![Cell { nodes: [0, 2], region: 0 }, Cell { nodes: [1, 2], region: 0 }];
     let mesh = Mesh { nodes, rods, regions: vec!["bars".into()], ..Mesh::default() };
-    let steel = Bar { modulus, yielding: 400e6, hardening: 2e9, kinematic: 1.0 };
+    let steel = Bar { modulus, ..Bar::new(400e6)? };
     let bodies = vec![always(Matter::Bar { steel, area, expansion: 1.2e-5, density: 7850.0 })];
     let mut model = Model { mesh, bodies, ..Model::default() };
     (0..3).for_each(|c| model.holds.extend([(0, c), (1, c)]));

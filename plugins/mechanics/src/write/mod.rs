@@ -1,8 +1,10 @@
-//! Results to files: VTU and PVD for ParaView ([`Grid`], [`Series`]), CSV for histories ([`csv`]).
+//! Results to files: VTU and PVD for ParaView ([`Grid`], [`Series`]), CSV for histories ([`csv`]), SVG
+//! for curves ([`plot()`]).
 //!
 //! Every file is written beside its place and renamed, so that nobody ever sees half of it. Columns
 //! and fields carry their unit in their name: `displacement_m`, `stress_pa`.
 
+mod plot;
 mod vtu;
 
 use std::{
@@ -14,6 +16,7 @@ use intrados_stage::{
     csv::text,
     file::{self, WriteError},
 };
+pub use plot::{Curve, plot};
 pub use vtu::{Field, Grid, Series};
 
 /// Writes a table: one column a name, one row a line, numbers as short as they can be without

@@ -72,10 +72,10 @@ fn column(h: f64) -> (Model, Vec<u32>) {
 #[test]
 #[ignore = "minutes"]
 fn soesianawati_column() {
-    let mut curves = vec![plot::Curve {
+    let mut curves = vec![Curve {
         name: "mean peak measured".into(),
         points: vec![(0.0, MEAN_PEAK), (60.0, MEAN_PEAK)],
-        measured: true,
+        marked: true,
     }];
     for h in sizes(&[0.1, 0.05, 0.0334]) {
         println!("Soesianawati's column, bricks of {:.1} mm", 1e3 * h);
@@ -93,13 +93,13 @@ fn soesianawati_column() {
         );
         gate("peak, kN", highest.1, MEAN_PEAK, 0.10);
         assert!((150.0..250.0).contains(&highest.1));
-        curves.push(plot::Curve {
+        curves.push(Curve {
             name: format!("bricks of {:.0} mm", 1e3 * h),
             points: found,
-            measured: false,
+            marked: false,
         });
         // After each mesh: the finest takes long.
-        plot::write(
+        draw(
             "soesianawati",
             "Column of Soesianawati, unit 1, pushed one way",
             ["deflection at the top, mm", "lateral force, kN"],

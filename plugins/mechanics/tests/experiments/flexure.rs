@@ -42,10 +42,10 @@ fn beam(h: f64) -> (Model, Vec<u32>, Vec<u32>) {
 fn janney_beam() {
     let data = measured("janney1956_beam.csv");
     let expected = peak(&data);
-    let mut curves = vec![plot::Curve {
+    let mut curves = vec![Curve {
         name: "Janney et al. (1956)".into(),
         points: data.clone(),
-        measured: true,
+        marked: true,
     }];
     for h in sizes(&[0.0508, 0.0381, 0.0305]) {
         println!("Janney's beam, bricks of {:.1} mm", 1e3 * h);
@@ -74,13 +74,13 @@ fn janney_beam() {
             top.1, top.0, expected.1, expected.0
         );
         assert!((33.0..48.0).contains(&top.1));
-        curves.push(plot::Curve {
+        curves.push(Curve {
             name: format!("bricks of {:.1} mm", 1e3 * h),
             points: found,
-            measured: false,
+            marked: false,
         });
         // After each mesh: the finest takes long.
-        plot::write(
+        draw(
             "janney",
             "Beam of Janney, Hognestad and McHenry: bars that yield",
             ["deflection at midspan, mm", "moment, kNm"],

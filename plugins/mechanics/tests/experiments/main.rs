@@ -35,10 +35,13 @@ mod band;
 mod column;
 mod flexure;
 mod panel;
-mod plot;
 mod shear;
 
-use std::{f64::consts::PI, path::PathBuf};
+use std::{
+    f64::consts::PI,
+    ffi::OsStr,
+    path::{Path, PathBuf},
+};
 
 use glam::DVec3;
 use intrados_mechanics::{
@@ -55,6 +58,7 @@ use intrados_mechanics::{
         Action, Body, Control, Drive, Load, March, MarchSettings, Matter, Model, Slipping, Steel, SteelKind,
         System,
     },
+    write::{Curve, plot},
 };
 use intrados_stage::Job;
 
@@ -70,6 +74,23 @@ fn measured(file: &str) -> Vec<(f64, f64)> {
         line.split_once(',').map(|(a, b)| (a.trim().parse().unwrap(), b.trim().parse().unwrap()))
     };
     text.lines().filter(|line| !line.starts_with('#')).filter_map(pair).collect()
+}
+
+/// Draws plugins/mechanics/docs/`name`.svg, or `name`-diffuse.svg for one damage for all
+/// directions, unless other choices are tried.
+fn draw(name: &str, title: &str, axes: [&str; 2], curves: &[Curve]) {
+    let other = |name: &OsStr| {
+        name.to_string_lossy().starts_with("EXPERIMENT_")
+            && name != "EXPERIMENT_TALK"
+            && name != DIFFUSE
+    };
+    if std::env::vars_os().any(|(name, _)| other(&name)) {
+        return;
+    }
+    let suffix = if std::env::var_os(DIFFUSE).is_some() { "-diffuse" } else { "" };
+    let file = format!("{name}{suffix}.svg");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs");
+    plot(&folder.join(file), title, axes, curves).unwrap();
 }
 
 /// The meshes asked for by `EXPERIMENT_SIZES` (m, with commas), or these.

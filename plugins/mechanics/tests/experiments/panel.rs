@@ -70,10 +70,10 @@ fn winkler_l_panel() {
     let data: Vec<(f64, f64)> = data.into_iter().map(|(mm, newton)| (mm, newton / 1e3)).collect();
     let expected = peak(&data);
     let code = fracture_energy(31e6);
-    let mut curves = vec![plot::Curve {
+    let mut curves = vec![Curve {
         name: "Winkler (2001), series A".into(),
         points: data.clone(),
-        measured: true,
+        marked: true,
     }];
     let asked = std::env::var_os("EXPERIMENT_SIZES");
     for (h, gf) in sizes(&[0.025, 0.0167, 0.0125])
@@ -102,13 +102,13 @@ fn winkler_l_panel() {
         );
         gate("peak, kN", top.1, expected.1, 0.10);
         assert!((4.0..10.0).contains(&top.1));
-        curves.push(plot::Curve {
+        curves.push(Curve {
             name: format!("{:.2} mm, G_f {gf:.0} N/m", 1e3 * h),
             points: found,
-            measured: false,
+            marked: false,
         });
         // After each mesh: the finest takes long.
-        plot::write(
+        draw(
             "winkler",
             "L-shaped panel of plain concrete",
             ["displacement of the load, mm", "load, kN"],

@@ -41,10 +41,10 @@ fn beam(h: f64) -> (Model, Vec<u32>) {
 fn vecchio_shim_oa1() {
     let data = measured("vecchio_shim_OA1.csv");
     let expected = peak(&data);
-    let mut curves = vec![plot::Curve {
+    let mut curves = vec![Curve {
         name: "Vecchio and Shim (2004)".into(),
         points: data.clone(),
-        measured: true,
+        marked: true,
     }];
     for h in sizes(&[0.092, 0.046, 0.0345]) {
         println!("OA1, bricks of {:.1} mm", 1e3 * h);
@@ -76,13 +76,13 @@ fn vecchio_shim_oa1() {
             found[found.len() - 1].1
         );
         assert!((150.0..600.0).contains(&top.1));
-        curves.push(plot::Curve {
+        curves.push(Curve {
             name: format!("bricks of {:.1} mm", 1e3 * h),
             points: found,
-            measured: false,
+            marked: false,
         });
         // After each mesh: the finest takes long.
-        plot::write(
+        draw(
             "oa1",
             "Beam OA1 without stirrups: diagonal tension",
             ["deflection at midspan, mm", "load, kN"],

@@ -1300,6 +1300,12 @@ impl Checker<'_> {
             self.within(&format!("history[{i}].0"), *day, -1e6, 1e6);
             self.within(&format!("history[{i}].1"), *factor, -1e6, 1e6);
         }
+        if l.loading.is_some() && !l.action.can_be_raised() {
+            self.error("loading", "LOADING", "weight and heat are not raised until members fail");
+        }
+        if let Some(crate::structure::Loading::Displacement { to_mm: Some(to) }) = l.loading {
+            self.within("loading.to_mm", to, 0.01, 1e4);
+        }
         if l.history.windows(2).any(|w| w[1].0 < w[0].0) {
             self.error("history", "ORDER", "its days must rise");
         }

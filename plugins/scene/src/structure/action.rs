@@ -157,6 +157,34 @@ pub struct Load {
     /// (day, factor), days ascending; factor 1 from day 0 where there is none.
     #[serde(default)]
     pub history: Vec<(f32, f32)>,
+    /// After its history it is raised until its members fail; it stays as it is where there is
+    /// nothing.
+    #[serde(default)]
+    pub loading: Option<Loading>,
+}
+
+/// Along what a load is raised until its members fail.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub enum Loading {
+    /// The displacement where it acts, and where that finds no equilibrium all displacements.
+    Automatic,
+    /// The displacement where it acts.
+    Displacement {
+        /// How far, mm; until the member has failed where there is none.
+        #[serde(default)]
+        to_mm: Option<f32>,
+    },
+    /// The arc of all displacements, which follows a member that snaps back.
+    ArcLength,
+}
+
+impl Action {
+    /// Whether it is of a kind that is raised until a member fails: not weight, nor heat.
+    #[must_use]
+    pub fn can_be_raised(&self) -> bool {
+        !matches!(self, Self::SelfWeight | Self::Air { .. } | Self::Temperature { .. })
+    }
 }
 
 /// What a load does.

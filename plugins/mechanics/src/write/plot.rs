@@ -1,12 +1,20 @@
-//! Curves over curves, as SVG for the docs.
+//! Curves over curves, as SVG.
 
-use std::{ffi::OsStr, fmt::Write, path::Path};
+use std::{fmt::Write, path::Path};
 
-/// A curve with its name; what was measured comes with marks.
-pub(super) struct Curve {
-    pub(super) name: String,
-    pub(super) points: Vec<(f64, f64)>,
-    pub(super) measured: bool,
+use intrados_stage::file::WriteError;
+
+use super::put;
+
+/// A curve with its name.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Curve {
+    /// For the key.
+    pub name: String,
+    /// In the units of the axes.
+    pub points: Vec<(f64, f64)>,
+    /// Black and with a mark at every point: what was measured, or what stands out.
+    pub marked: bool,
 }
 
 const WIDTH: f64 = 640.0;
@@ -15,25 +23,17 @@ const HEIGHT: f64 = 400.0;
 const MARGIN: [f64; 4] = [60.0, 16.0, 34.0, 48.0];
 const INKS: [&str; 4] = ["#7aa6c2", "#3f78a8", "#12406b", "#b0592a"];
 
-/// Writes plugins/mechanics/docs/`name`.svg, or `name`-diffuse.svg for one damage for all
-/// directions, unless other choices are tried.
-pub(super) fn write(name: &str, title: &str, axes: [&str; 2], curves: &[Curve]) {
-    let other = |name: &OsStr| {
-        name.to_string_lossy().starts_with("EXPERIMENT_")
-            && name != "EXPERIMENT_TALK"
-            && name != super::DIFFUSE
-    };
-    if std::env::vars_os().any(|(name, _)| other(&name)) {
-        return;
-    }
-    let file = if std::env::var_os(super::DIFFUSE).is_some() {
-        format!("{name}-diffuse.svg")
-    } else {
-        format!("{name}.svg")
-    };
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs");
-    std::fs::create_dir_all(&folder).unwrap();
-    std::fs::write(folder.join(file), svg(title, axes, curves)).unwrap();
+/// Draws curves over curves, both axes from 0; the file is written as a whole.
+///
+/// # Errors
+/// The file cannot be written.
+pub fn plot(
+    path: &Path,
+    title: &str,
+    axes: [&str; 2],
+    curves: &[Curve],
+) -> Result<(), WriteError> {
+    put(path, |out| out.write_all(svg(title, axes, curves).as_bytes()))
 }
 
 fn svg(title: &str, axes: [&str; 2], curves: &[Curve]) -> String {
@@ -73,11 +73,11 @@ fn svg(title: &str, axes: [&str; 2], curves: &[Curve]) -> String {
         axes[1]
     );
     let computed = curves.iter().scan(0, |n, c| {
-        *n += usize::from(!c.measured);
+        *n += usize::from(!c.marked);
         Some(*n)
     });
     for (k, (curve, number)) in curves.iter().zip(computed).enumerate() {
-        let ink = if curve.measured { "#000" } else { INKS[(number - 1) % INKS.len()] };
+        let ink = if curve.marked { "#000" } else { INKS[(number - 1) % INKS.len()] };
         let path: Vec<String> =
             curve.points.iter().map(|p| format!("{:.1} {:.1}", x(p.0), y(p.1))).collect();
         let _ = writeln!(
@@ -85,7 +85,7 @@ fn svg(title: &str, axes: [&str; 2], curves: &[Curve]) -> String {
             "<path d=\"M{}\" fill=\"none\" stroke=\"{ink}\" stroke-width=\"1.6\"/>",
             path.join("L")
         );
-        if curve.measured {
+        if curve.marked {
             for p in &curve.points {
                 let _ = write!(
                     out,

@@ -1,0 +1,546 @@
+//! Strength: after its life, a member's loads are raised until it fails and beyond, along a curve of
+//! load over displacement; and by what it fails is told from what happened where.
+//!
+//! What is controlled is the mean displacement of the loaded nodes along their loads, u = Σ pᵢ uᵢ /
+//! Σ |pᵢ|: it grows while a member yields and where it softens. Where no further equilibrium is
+//! found that way, the step follows the arc of all displacements instead, which may snap back.
+
+use intrados_stage::Job;
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    analysis::past_peak,
+    member::Prepared,
+    model::{
+        Action, Control, Drive, Failure, History, March, MarchSettings, Point, SteelKind, Step,
+        System,
+    },
+};
+
+/// Loads that are raised, and along what.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Raised {
+    /// Which, of the model's.
+    pub loads: Vec<usize>,
+    /// Along what.
+    pub along: Along,
+}
+
+/// What grows from step to step.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum Along {
+    /// The displacement of the loaded nodes; the arc where that finds nothing more.
+    #[default]
+    Automatic,
+    /// The displacement of the loaded nodes, up to so much, m.
+    Displacement(Option<f64>),
+    /// The arc of all displacements.
+    ArcLength,
+}
+
+/// How a member fails.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Mode {
+    /// Bars yield in tension before the load falls.
+    Yielding,
+    /// Concrete is crushed while no bar has yielded in tension.
+    Crushing,
+    /// A crack oblique to the axis opens, and the load falls.
+    DiagonalTension,
+    /// The same, and the concrete at its end is crushed.
+    ShearCompression,
+    /// Bars are pulled out.
+    Anchorage,
+    /// It leaves its shape before its materials are spent.
+    Buckling,
+    /// Tendons break.
+    PrestressRupture,
+    /// Bars break.
+    BarRupture,
+    /// Concrete tears that no steel holds.
+    Tearing,
+    /// It has not failed as far as it was followed.
+    None,
+}
+
+impl Mode {
+    /// In the field's words.
+    #[must_use]
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::Yielding => "yielding",
+            Self::Crushing => "crushing",
+            Self::DiagonalTension => "diagonal tension",
+            Self::ShearCompression => "shear compression",
+            Self::Anchorage => "anchorage",
+            Self::Buckling => "buckling",
+            Self::PrestressRupture => "rupture of tendons",
+            Self::BarRupture => "rupture of bars",
+            Self::Tearing => "tearing of plain concrete",
+            Self::None => "none as far as it was followed",
+        }
+    }
+}
+
+/// A point of the curve.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct CurvePoint {
+    /// Mean displacement of the loaded nodes along their loads since these are raised, m.
+    pub displacement_m: f64,
+    /// Factor of the raised loads: 1 is what the scene writes.
+    pub load_factor: f64,
+    /// Their resultant, N; where displacements are prescribed, what these take.
+    pub load_n: f64,
+    /// What is out of balance, over all that acts.
+    pub residual: f64,
+}
+
+/// What a member bears.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Strength {
+    /// Names of the loads that were raised.
+    pub loads: Vec<String>,
+    /// Equilibria in their order.
+    pub curve: Vec<CurvePoint>,
+    /// The highest.
+    pub peak: CurvePoint,
+    /// Where a bar yields first.
+    pub yielding: Option<CurvePoint>,
+    /// Where the load has fallen to [`FAILED`] of the peak.
+    pub ultimate: Option<CurvePoint>,
+    /// Displacement there over that where a bar yields first.
+    pub ductility: Option<f64>,
+    /// How it fails.
+    pub mode: Mode,
+    /// Why that is said.
+    pub because: String,
+    /// Why it was followed no further.
+    pub ended: String,
+}
+
+/// Share of the peak at which a member counts as failed (the usual definition of ultimate
+/// displacement: Park 1989 takes .8).
+pub const FAILED: f64 = 0.8;
+/// Share of the peak at which it is followed no further.
+const SPENT: f64 = 0.6;
+/// How far the first step goes, over the longest measure of the member.
+const FIRST: f64 = 1e-6;
+/// By so much steps grow while the member answers as it did at first.
+const GROWTH: f64 = 1.5;
+/// Stiffness over that of the beginning from which on steps are short.
+const SOFT: f64 = 0.85;
+/// Short steps, over how far it has moved.
+const SHORT: f64 = 0.04;
+/// Steps, at most.
+const STEPS: usize = 400;
+/// It is followed no further than so many times the displacement at the first yielding.
+const DUCTILE: f64 = 12.0;
+/// How far parts may move, over the longest measure.
+const FAR: f64 = 0.1;
+/// A crack whose normal is so far off the axis is oblique, degrees.
+const OBLIQUE: [f64; 2] = [20.0, 70.0];
+/// Damage of compression past its peak from which concrete counts as crushed.
+const CRUSHED: f64 = 0.3;
+
+/// How equilibria are found while loads are raised, from how they are found in a life: many cracks
+/// grow in every step, and the last per mille costs most.
+pub(crate) fn settings(of_life: MarchSettings) -> MarchSettings {
+    MarchSettings {
+        tolerance: of_life.tolerance.max(5e-3),
+        loose: 4.0,
+        iterations: 40,
+        ..of_life
+    }
+}
+
+/// What is watched on the way.
+struct Watch<'a, 'm> {
+    structure: &'a System<'m>,
+    prepared: &'a Prepared,
+    raised: &'a Raised,
+    /// Displacement weights of the loaded nodes.
+    row: Vec<(u32, u8, f64)>,
+    /// Σ wᵢ uᵢ before loads were raised.
+    begin: f64,
+    /// Factor of the loads then.
+    base: f64,
+    curve: Vec<CurvePoint>,
+    yielding: Option<(CurvePoint, String)>,
+    /// At the peak: number in the curve, cracks' openings and damage of compression by point.
+    peak: usize,
+    at_peak: Vec<[Point; 8]>,
+    history_at_peak: Option<History>,
+    last: Vec<[Point; 8]>,
+    broken: Option<(Mode, String)>,
+}
+
+/// Raises loads from a state in equilibrium until the member has failed; `each` sees every
+/// equilibrium.
+///
+/// # Errors
+/// [`Failure`], but for steps that find no equilibrium: they end the curve, which says so.
+pub(crate) fn raise(
+    structure: &System,
+    prepared: &Prepared,
+    raised: &Raised,
+    history: History,
+    settings: MarchSettings,
+    job: &Job,
+    mut each: impl FnMut(&History, &Step, &[[Point; 8]]) -> Result<(), Failure>,
+) -> Result<(Strength, History), Failure> {
+    let mut watch = Watch::new(structure, prepared, raised, &history)?;
+    let drive = |control: Control| Drive::Raised {
+        loads: raised.loads.iter().map(|&l| (l, share_of(structure, l, history.time))).collect(),
+        control,
+    };
+    let by_displacement = drive(Control::Row(watch.row.clone()));
+    let by_arc = drive(Control::Arc);
+    let arc_only = raised.along == Along::ArcLength;
+    let start = History { turned: true, factor: 0.0, ..history };
+    let first_drive = if arc_only { by_arc.clone() } else { by_displacement };
+    let mut march = March::new(structure, start, first_drive, settings);
+    let length = longest(structure);
+    // An arc counts all nodes.
+    let mut unit = if arc_only { nodes(structure).sqrt() } else { 1.0 };
+    let (mut step, mut stiffness, mut is_arc) = (FIRST * length, None, arc_only);
+    let mut ended = format!("{STEPS} steps were taken");
+    for _ in 0..STEPS {
+        job.check()?;
+        // A second a step, for whoever looks at the pictures.
+        let time = march.history.time + 1.0;
+        let went = march.advance(time, step * unit, job, |history, step| {
+            let points = structure.all_points(history)?;
+            watch.see(history, step, &points);
+            each(history, step, &points)
+        });
+        match went {
+            Ok(()) => {}
+            Err(Failure::NotConverged { .. } | Failure::Solve(_))
+                if !is_arc && raised.along == Along::Automatic && watch.curve.len() > 1 =>
+            {
+                is_arc = true;
+                unit = nodes(structure).sqrt();
+                step *= 0.25;
+                march = March::new(structure, march.history, by_arc.clone(), settings);
+                continue;
+            }
+            Err(why @ (Failure::NotConverged { .. } | Failure::Solve(_) | Failure::Laborious)) => {
+                ended = why.to_string();
+                break;
+            }
+            Err(other) => return Err(other),
+        }
+        if let Some(why) = watch.is_spent(length) {
+            ended = why;
+            break;
+        }
+        step = watch.next(step, &mut stiffness);
+    }
+    let history = march.history;
+    Ok((watch.tell(ended, job)?, history))
+}
+
+/// How much of a load one of the factor is: what acts of it already, or all of it where nothing
+/// does.
+fn share_of(structure: &System, load: usize, time: f64) -> f64 {
+    let factor = structure.model.loads[load].factor(time);
+    if factor == 0.0 { 1.0 } else { factor }
+}
+
+fn nodes(structure: &System) -> f64 {
+    structure.model.mesh.nodes.len() as f64
+}
+
+/// Longest measure of a model, m.
+fn longest(structure: &System) -> f64 {
+    structure.model.mesh.bounds().map_or(0.0, |[low, high]| (high - low).max_element())
+}
+
+impl<'a, 'm> Watch<'a, 'm> {
+    fn new(
+        structure: &'a System<'m>,
+        prepared: &'a Prepared,
+        raised: &'a Raised,
+        history: &History,
+    ) -> Result<Self, Failure> {
+        let (mut pull, mut base) = (vec![0.0; structure.unknowns()], 0.0_f64);
+        for &load in &raised.loads {
+            let share = share_of(structure, load, history.time);
+            let action = &structure.model.loads[load].action;
+            structure.add_load(action, share, history.time, &mut pull)?;
+            if let Action::Displacement(values) = action {
+                values
+                    .iter()
+                    .for_each(|&(n, c, v)| pull[3 * n as usize + usize::from(c)] += share * v);
+            }
+            base = base.max(structure.model.loads[load].factor(history.time).abs());
+        }
+        let all: f64 = pull.iter().map(|p| p.abs()).sum();
+        let row = pull.iter().enumerate().filter(|(_, p)| **p != 0.0);
+        let row = row.map(|(i, p)| ((i / 3) as u32, (i % 3) as u8, p / all)).collect();
+        let mut watch = Self {
+            structure,
+            prepared,
+            raised,
+            row,
+            begin: 0.0,
+            base: if base == 0.0 { 0.0 } else { 1.0 },
+            curve: Vec::new(),
+            yielding: None,
+            peak: 0,
+            at_peak: Vec::new(),
+            history_at_peak: None,
+            last: Vec::new(),
+            broken: None,
+        };
+        watch.begin = watch.displacement(history);
+        let start = watch.point(&History { factor: 0.0, ..history.clone() }, 0.0);
+        watch.curve.push(start);
+        Ok(watch)
+    }
+
+    fn displacement(&self, history: &History) -> f64 {
+        self.row.iter().map(|&(n, c, w)| w * history.x[3 * n as usize + usize::from(c)]).sum()
+    }
+
+    fn point(&self, history: &History, residual: f64) -> CurvePoint {
+        let load_factor = self.base + history.factor;
+        // What the nodes that are loaded or moved take, along their loads.
+        let taken: f64 = self
+            .row
+            .iter()
+            .map(|&(n, c, w)| w.signum() * history.force[3 * n as usize + usize::from(c)])
+            .sum();
+        let forces: f64 = self.raised.loads.iter().map(|&l| self.resultant(l, history.time)).sum();
+        CurvePoint {
+            displacement_m: self.displacement(history) - self.begin,
+            load_factor,
+            load_n: if forces > 0.0 { load_factor * forces } else { taken },
+            residual,
+        }
+    }
+
+    /// Resultant of a load at factor 1, N.
+    fn resultant(&self, load: usize, time: f64) -> f64 {
+        let mut forces = vec![0.0; self.structure.unknowns()];
+        let of = &self.structure.model.loads[load];
+        if self.structure.add_load(&of.action, 1.0, time, &mut forces).is_err() {
+            return 0.0;
+        }
+        let sum = forces
+            .as_chunks::<3>()
+            .0
+            .iter()
+            .fold(glam::DVec3::ZERO, |sum, f| sum + glam::DVec3::from_array(*f));
+        sum.length()
+    }
+
+    fn see(&mut self, history: &History, step: &Step, points: &[[Point; 8]]) {
+        let point = self.point(history, step.residual);
+        self.curve.push(point);
+        if point.load_factor > self.curve[self.peak].load_factor || self.at_peak.is_empty() {
+            self.peak = self.curve.len() - 1;
+            self.at_peak = points.to_vec();
+            self.history_at_peak = Some(history.clone());
+        }
+        self.last = points.to_vec();
+        for (steel, works) in self.structure.model.steel.iter().zip(&history.steel) {
+            let (bar, tendon) = match &steel.kind {
+                SteelKind::Bar(bar) | SteelKind::Stressed(bar, _) => (Some(bar), None),
+                SteelKind::Tendon(tendon) => (None, Some(tendon)),
+            };
+            for work in works {
+                if bar.is_some() && self.yielding.is_none() && work.bar.plastic > 1e-5 {
+                    self.yielding = Some((point, steel.name.clone()));
+                }
+                if bar.is_some_and(|bar| work.bar.plastic.abs() > bar.rupture) {
+                    self.broken.get_or_insert((Mode::BarRupture, steel.name.clone()));
+                }
+                if tendon.is_some_and(|t| work.stress >= t.strand.strength) {
+                    self.broken.get_or_insert((Mode::PrestressRupture, steel.name.clone()));
+                }
+            }
+        }
+    }
+
+    /// Why it need not be followed any further.
+    fn is_spent(&self, length: f64) -> Option<String> {
+        let (now, peak) = (self.curve[self.curve.len() - 1], self.curve[self.peak]);
+        let moved = now.displacement_m.abs();
+        if let Some((mode, name)) = &self.broken {
+            return Some(format!("{}: {name}", mode.words()));
+        }
+        if now.load_factor - self.curve[0].load_factor
+            < SPENT * (peak.load_factor - self.curve[0].load_factor)
+            && peak.load_factor > self.curve[0].load_factor
+        {
+            return Some(format!("the load has fallen below {SPENT} of its peak"));
+        }
+        if let Along::Displacement(Some(to)) = self.raised.along
+            && moved >= to * (1.0 - 1e-9)
+        {
+            return Some(format!("it has moved by the {:.1} mm asked for", 1e3 * to));
+        }
+        if let Some((at, _)) = &self.yielding
+            && moved > DUCTILE * at.displacement_m.abs()
+        {
+            return Some(format!("it has moved {DUCTILE} times as far as where bars yield first"));
+        }
+        (moved > FAR * length).then(|| "it has moved by a tenth of its length".into())
+    }
+
+    /// How far the next step goes.
+    fn next(&self, step: f64, stiffness: &mut Option<f64>) -> f64 {
+        let [before, now] = [self.curve[self.curve.len() - 2], self.curve[self.curve.len() - 1]];
+        let slope = (now.load_factor - before.load_factor)
+            / (now.displacement_m - before.displacement_m).abs().max(1e-300);
+        let first = *stiffness.get_or_insert(slope);
+        let moved = now.displacement_m.abs();
+        let next = if slope > SOFT * first { GROWTH * step } else { step.min(SHORT * moved) };
+        let most = match self.raised.along {
+            Along::Displacement(Some(to)) => (to - moved).max(0.0),
+            _ => f64::INFINITY,
+        };
+        next.max(0.5 * SHORT * moved).min(2.5 * SHORT * moved.max(step)).min(most)
+    }
+
+    /// What it comes to.
+    fn tell(self, ended: String, job: &Job) -> Result<Strength, Failure> {
+        let peak = self.curve[self.peak];
+        let failed = |p: &&CurvePoint| {
+            p.load_factor - self.curve[0].load_factor
+                < FAILED * (peak.load_factor - self.curve[0].load_factor)
+        };
+        let ultimate = self.curve[self.peak..].iter().find(failed).copied();
+        let yielding = self.yielding.as_ref().map(|y| y.0);
+        let ductility = ultimate
+            .zip(yielding)
+            .map(|(u, y)| u.displacement_m / y.displacement_m)
+            .filter(|d| *d >= 1.0);
+        let (mode, because) = self.mode(ultimate.is_some(), job)?;
+        Ok(Strength {
+            loads: self
+                .raised
+                .loads
+                .iter()
+                .map(|&l| self.structure.model.loads[l].name.clone())
+                .collect(),
+            peak,
+            yielding,
+            ultimate,
+            ductility,
+            mode,
+            because,
+            ended,
+            curve: self.curve,
+        })
+    }
+
+    /// By what it fails, from what happened where.
+    fn mode(&self, has_failed: bool, job: &Job) -> Result<(Mode, String), Failure> {
+        let peak = self.curve[self.peak];
+        let at = |p: &CurvePoint| format!("{:.0} kN, {:.1} mm", 1e-3 * p.load_n, 1e3 * p.displacement_m);
+        if let Some((mode, name)) = &self.broken {
+            return Ok((*mode, format!("{name} breaks")));
+        }
+        let yielded = self.yielding.as_ref().filter(|(y, _)| {
+            y.displacement_m <= peak.displacement_m
+        });
+        let after = yielded.map_or(String::new(), |(y, name)| {
+            format!("; {name} yields at {}", at(y))
+        });
+        let opened = self.opened();
+        let crushed = self.crushed();
+        let oblique = opened[1] > 0.5 * opened.iter().sum::<f64>() && opened[1] > 0.0;
+        // A fall that a diagonal crack brings is one even after bars have yielded.
+        if has_failed && oblique {
+            let mode =
+                if crushed > 0.0 { Mode::ShearCompression } else { Mode::DiagonalTension };
+            let crushes = if crushed > 0.0 { ", and concrete is crushed" } else { "" };
+            return Ok((
+                mode,
+                format!(
+                    "past the peak {:.0} % of what opens are cracks oblique to the axis{crushes}{after}",
+                    100.0 * opened[1] / opened.iter().sum::<f64>()
+                ),
+            ));
+        }
+        if let Some((y, name)) = yielded {
+            let crushes = if crushed > 0.0 { ", then concrete is crushed" } else { "" };
+            return Ok((Mode::Yielding, format!("{name} yields at {}{crushes}", at(y))));
+        }
+        if let Some(history) = &self.history_at_peak
+            && has_failed
+        {
+            let near = self.structure.nearness_to_buckling(history, &self.at_peak, job)?;
+            if let Some(share) = near.filter(|share| *share > BUCKLES) {
+                return Ok((
+                    Mode::Buckling,
+                    format!(
+                        "at the peak its loads are {share:.2} of those under which it buckles while it is elastic"
+                    ),
+                ));
+            }
+        }
+        if crushed > 0.0 {
+            return Ok((
+                Mode::Crushing,
+                format!("{:.1} % of its concrete is crushed, no bar yields in tension", 100.0 * crushed),
+            ));
+        }
+        if has_failed && self.slipped() {
+            return Ok((Mode::Anchorage, "bars slip from the concrete".into()));
+        }
+        if has_failed {
+            return Ok((Mode::Tearing, "cracks open that no steel holds".into()));
+        }
+        Ok((Mode::None, "its load has not fallen, and no bar has yielded".into()))
+    }
+
+    /// Σ opening × area of cracks across the axis, oblique and along it that has come since the
+    /// peak, m³.
+    fn opened(&self) -> [f64; 3] {
+        let along = self.prepared.direction;
+        let mut sums = [0.0; 3];
+        for (hex, (before, now)) in self.at_peak.iter().zip(&self.last).enumerate() {
+            let area = (self.structure.model.mesh.hex_volume(hex as u32) / 8.0).powf(2.0 / 3.0);
+            for (before, now) in before.iter().zip(now) {
+                let cosine = glam::DVec3::from_array(now.normal).dot(along).abs().min(1.0);
+                let off = cosine.acos().to_degrees();
+                let class = usize::from(off > OBLIQUE[0]) + usize::from(off > OBLIQUE[1]);
+                sums[class] += area * (now.crack - before.crack).max(0.0);
+            }
+        }
+        sums
+    }
+
+    /// Share of the volume that is crushed at the end.
+    fn crushed(&self) -> f64 {
+        let (mut crushed, mut whole) = (0.0, 0.0);
+        for (hex, points) in self.last.iter().enumerate() {
+            let volume = self.structure.model.mesh.hex_volume(hex as u32) / 8.0;
+            for point in points {
+                whole += volume;
+                if past_peak([0.0, point.damage[1]]) > CRUSHED {
+                    crushed += volume;
+                }
+            }
+        }
+        crushed / f64::max(whole, 1e-300)
+    }
+
+    /// Whether a free end of a bar has slipped beyond what bond bears most at.
+    fn slipped(&self) -> bool {
+        let Some(history) = &self.history_at_peak else { return false };
+        self.structure.model.steel.iter().enumerate().any(|(bar, steel)| {
+            let Some(slipping) = &steel.bond else { return false };
+            [0, steel.pieces.len()].into_iter().any(|end| {
+                let node = self.structure.slip_node(bar, end);
+                node.is_some_and(|n| history.x[3 * n as usize].abs() > slipping.bond.slips[0])
+            })
+        })
+    }
+}
+
+/// Loads over those of elastic buckling at the peak, from which that is what ends it.
+const BUCKLES: f64 = 0.5;
