@@ -6,7 +6,7 @@ use super::Mesh;
 use crate::element::hex8;
 
 /// A point is inside as long as its natural coordinates stay within ±(1 + this).
-pub const TOLERANCE: f64 = 1e-6;
+pub(crate) const TOLERANCE: f64 = 1e-6;
 
 /// Where a point is in the mesh.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -26,8 +26,9 @@ use std::{collections::BTreeMap, fmt};
 
 use glam::DVec3;
 
-pub use generate::{block, divide, mapped};
-pub use locate::{Host, Locator, TOLERANCE};
+pub(crate) use generate::mapped;
+pub use generate::{block, divide};
+pub use locate::{Host, Locator};
 pub(crate) use polar::{Layer, Polar, Rings};
 pub(crate) use topology::FaceTable;
 

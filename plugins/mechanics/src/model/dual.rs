@@ -96,7 +96,7 @@ impl System<'_> {
     ///
     /// # Errors
     /// [`Failure`].
-    pub fn influences(
+    pub(crate) fn influences(
         &self,
         gauges: &[Gauge],
         history: &History,

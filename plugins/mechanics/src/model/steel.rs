@@ -109,7 +109,7 @@ pub struct Piecework {
 }
 
 /// How long jacking takes, s.
-pub const JACKING: f64 = 21_600.0;
+pub(crate) const JACKING: f64 = 21_600.0;
 
 impl Steel {
     /// What its pieces remember before anything has happened.

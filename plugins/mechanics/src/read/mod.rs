@@ -23,7 +23,7 @@ pub(crate) use deck::{
 };
 
 /// The largest file that is read, bytes.
-pub const MAX_BYTES: u64 = 2 << 30;
+pub(crate) const MAX_BYTES: u64 = 2 << 30;
 /// Entries that sets, loads and supports of one file may expand to.
 const MAX_ENTRIES: usize = 50_000_000;
 
@@ -39,7 +39,7 @@ pub enum Units {
 impl Units {
     /// Metres.
     #[must_use]
-    pub fn length(self) -> f64 {
+    pub(crate) fn length(self) -> f64 {
         match self {
             Self::MetreNewton => 1.0,
             Self::MillimetreNewton => 1e-3,
@@ -48,13 +48,13 @@ impl Units {
 
     /// Square metres.
     #[must_use]
-    pub fn area(self) -> f64 {
+    pub(crate) fn area(self) -> f64 {
         self.length() * self.length()
     }
 
     /// Pascal.
     #[must_use]
-    pub fn stress(self) -> f64 {
+    pub(crate) fn stress(self) -> f64 {
         match self {
             Self::MetreNewton => 1.0,
             Self::MillimetreNewton => 1e6,
@@ -63,7 +63,7 @@ impl Units {
 
     /// Kilogram per cubic metre.
     #[must_use]
-    pub fn density(self) -> f64 {
+    pub(crate) fn density(self) -> f64 {
         match self {
             Self::MetreNewton => 1.0,
             Self::MillimetreNewton => 1e12,
@@ -72,7 +72,7 @@ impl Units {
 
     /// J/(kg·K): the square of the unit of velocity.
     #[must_use]
-    pub fn specific_heat(self) -> f64 {
+    pub(crate) fn specific_heat(self) -> f64 {
         match self {
             Self::MetreNewton => 1.0,
             Self::MillimetreNewton => 1e-6,

@@ -25,7 +25,7 @@ impl<const B: usize> BlockMatrix<B> {
     }
 
     /// The blocks that it has.
-    pub fn pattern(&self) -> &Arc<Pattern> {
+    pub(crate) fn pattern(&self) -> &Arc<Pattern> {
         &self.pattern
     }
 
@@ -40,7 +40,7 @@ impl<const B: usize> BlockMatrix<B> {
     }
 
     /// Sets every value to zero; the pattern stays.
-    pub fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         self.values.par_chunks_mut(1 << 12).for_each(|c| c.fill([[0.0; B]; B]));
     }
 
