@@ -171,7 +171,8 @@ pub(crate) fn locate(nodes: &[DVec3; 8], point: DVec3) -> Option<DVec3> {
 ///
 /// # Errors
 /// [`ElementError::Inverted`].
-pub fn volume(nodes: &[DVec3; 8]) -> Result<f64, ElementError> {
+#[cfg(test)]
+pub(crate) fn volume(nodes: &[DVec3; 8]) -> Result<f64, ElementError> {
     let mut sum = 0.0;
     for (point, natural) in GAUSS.into_iter().enumerate() {
         sum += right_way_round(jacobian(nodes, natural).determinant(), point)?;

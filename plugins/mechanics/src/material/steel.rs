@@ -135,13 +135,6 @@ impl Strand {
         Ok(())
     }
 
-    /// Largest stress while jacking, min(.8 f_pk, .9 f_p0.1k), and right after, min(.75 f_pk, .85
-    /// f_p0.1k) (EN 1992-1-1 §5.10.2, §5.10.3), Pa.
-    #[must_use]
-    pub fn limits(&self) -> (f64, f64) {
-        ((0.8 * self.strength).min(0.9 * self.proof), (0.75 * self.strength).min(0.85 * self.proof))
-    }
-
     /// Stress lost at constant strain `time` (s) after stressing to `initial`, Pa, positive:
     /// σ k ρ₁₀₀₀ e^(cμ) (t/1000 h)^(.75(1−μ)) 1e-5 with μ = σ/f_pk (EN 1992-1-1 (3.28)–(3.30)).
     #[must_use]

@@ -48,13 +48,15 @@ impl<const B: usize> BlockMatrix<B> {
     ///
     /// # Panics
     /// If there is no such node or component.
-    pub fn add_spring(&mut self, node: usize, component: usize, stiffness: f64) {
+    #[cfg(test)]
+    pub(crate) fn add_spring(&mut self, node: usize, component: usize, stiffness: f64) {
         let d = self.diagonal_at(node);
         self.values[d][component][component] += stiffness;
     }
 
     /// The block that joins two nodes; `None` where the pattern has none.
-    pub fn block(&self, row: usize, column: usize) -> Option<&[[f64; B]; B]> {
+    #[cfg(test)]
+    pub(crate) fn block(&self, row: usize, column: usize) -> Option<&[[f64; B]; B]> {
         let at = self.pattern.row(row).binary_search(&(column as u32)).ok()?;
         self.values.get(self.pattern.starts[row] + at)
     }

@@ -30,11 +30,6 @@ impl Connectivity {
         self.starts.len() - 1
     }
 
-    /// Whether there is none.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-
     /// The nodes of element `e`.
     ///
     /// # Panics
