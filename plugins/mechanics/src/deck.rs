@@ -19,6 +19,7 @@ use intrados_stage::Job;
 
 use crate::{
     element::{ElementError, embed::EmbedError, hex8::Kind, load},
+    material::durability::CorrosionError,
     member::{Part, Prepared},
     mesh::{ElementId, HexFace, Locator, Mesh},
     model::{
@@ -118,7 +119,7 @@ impl Case {
             self.notes.push("stresses of shells are not reported: their displacements are".into());
         }
         let times = self.steps.iter().map(|s| s.1).collect();
-        let corrosion = Err("a deck says nothing of exposure".into());
+        let corrosion = Err(CorrosionError::Deck);
         Prepared {
             id: id.into(),
             model: self.model,

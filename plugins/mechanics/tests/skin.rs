@@ -4,7 +4,7 @@
 use glam::{DVec3, Vec3};
 use intrados_mechanics::{
     analysis::analyze,
-    material::{concrete::Given, law::Setting},
+    material::{concrete::Given, durability::CorrosionError, law::Setting},
     member::{Part, Prepared},
     mesh::{block, divide},
     model::{Action, Body, Load, MarchSettings, Matter, Model, System},
@@ -84,7 +84,7 @@ fn beam() -> Prepared {
         parts: vec![part],
         axis: None,
         gauges: vec![],
-        corrosion: Err(String::new()),
+        corrosion: Err(CorrosionError::NoBars),
         attacked: 0.0,
         warnings: vec![],
         notes: vec![],

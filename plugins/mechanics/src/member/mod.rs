@@ -26,7 +26,10 @@ use warmth::Air;
 
 use crate::{
     element::embed::EmbedError,
-    material::{self, DAY, durability::Corrosion},
+    material::{
+        self, DAY,
+        durability::{Corrosion, CorrosionError},
+    },
     mesh::{
         MeshError,
         voxel::{GeometricError, VoxelError},
@@ -63,7 +66,7 @@ pub struct Prepared {
     /// What a user must know before believing what comes of it: what was given and is not used.
     pub warnings: Vec<String>,
     /// What attacks the steel, from [`Prepared::attacked`] on; or why nothing of that is computed.
-    pub corrosion: Result<Corrosion, String>,
+    pub corrosion: Result<Corrosion, CorrosionError>,
     /// When that begins, s.
     pub attacked: f64,
     /// What a user should know: assumptions, and what was left out.
@@ -200,7 +203,7 @@ pub(crate) struct Draft<'a> {
     pub(crate) axes: Axes,
     pub(crate) model: Model,
     pub(crate) warnings: Vec<String>,
-    pub(crate) corrosion: Result<Corrosion, String>,
+    pub(crate) corrosion: Result<Corrosion, CorrosionError>,
     pub(crate) notes: Vec<String>,
     pub(crate) geometry: Option<GeometricError>,
     /// Warmer air, by load.
@@ -283,7 +286,7 @@ impl<'a> Draft<'a> {
             axes,
             model,
             warnings: Vec::new(),
-            corrosion: Err(String::new()),
+            corrosion: Err(CorrosionError::NoBars),
             notes: Vec::new(),
             geometry: None,
             air: Vec::new(),

@@ -80,14 +80,19 @@ impl Units {
     }
 }
 
-impl FromStr for Units {
-    type Err = String;
+/// Units that no deck is read in, as they were given.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("units {0:?}: give \"m,N\" or \"mm,N\"")]
+pub struct UnitsError(String);
 
-    fn from_str(text: &str) -> Result<Self, String> {
+impl FromStr for Units {
+    type Err = UnitsError;
+
+    fn from_str(text: &str) -> Result<Self, UnitsError> {
         match text.replace(' ', "").as_str() {
             "m,N" => Ok(Self::MetreNewton),
             "mm,N" => Ok(Self::MillimetreNewton),
-            _ => Err(format!("units {text:?}: give \"m,N\" or \"mm,N\"")),
+            _ => Err(UnitsError(text.to_owned())),
         }
     }
 }
@@ -236,7 +241,7 @@ mod tests {
     fn units_are_named() {
         assert_eq!("m,N".parse(), Ok(Units::MetreNewton));
         assert_eq!("mm, N".parse(), Ok(Units::MillimetreNewton));
-        assert!("in,lbf".parse::<Units>().unwrap_err().contains("m,N"));
+        assert!("in,lbf".parse::<Units>().unwrap_err().to_string().contains("m,N"));
         // 7850 kg/m³ is 7.85e-9 t/mm³; 9810 mm/s² is 9.81 m/s²; force = density · volume ·
         // acceleration stays newton.
         let mm = Units::MillimetreNewton;

@@ -22,8 +22,8 @@ use serde::{Deserialize, Serialize};
 
 pub use along::Along;
 pub use check::check;
-pub use face::Face;
 pub(crate) use face::Sort;
+pub use face::{Face, FaceError};
 pub(crate) use place::{no_member, place};
 pub(crate) use table::{RawReading, read as read_table};
 
