@@ -4,10 +4,9 @@
 use glam::{DVec3, Vec3};
 use intrados_mechanics::{
     analysis::analyze,
-    material::{concrete::Given, durability::CorrosionError, law::Setting},
+    material::durability::CorrosionError,
     member::{Part, Prepared},
-    mesh::{block, divide},
-    model::{Action, Body, Load, MarchSettings, Matter, Model, System},
+    prelude::*,
     skin::{Looking, Seen, Skin},
 };
 use intrados_scene::MemberKind;

@@ -1,11 +1,7 @@
 //! One crack, whatever the shape of the bricks and wherever they look: work G_f A.
 
 use glam::DMat3;
-use intrados_mechanics::{
-    material::{concrete::Given, law::reach},
-    mesh::block,
-    model::{Drive, March, MarchSettings, System},
-};
+use intrados_mechanics::{material::law::reach, prelude::*};
 
 use super::*;
 

@@ -2,11 +2,7 @@
 //! mm, loaded at its thirds, three No. 5 bars (600 mm²) at 210.8 mm from the top, no stirrups; f_c
 //! 36.2 MPa, f_y 333 MPa. Half of it is computed, on plates of 76 mm that the source does not give.
 
-use intrados_mechanics::{
-    material::concrete::Given,
-    mesh::{block, divide},
-    model::Model,
-};
+use intrados_mechanics::prelude::*;
 
 use super::*;
 

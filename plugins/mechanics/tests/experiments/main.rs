@@ -45,16 +45,14 @@ use intrados_mechanics::{
     element::embed::embed,
     material::{
         bond::Bond,
-        concrete::{Code, Given, Properties, tensile_strength},
+        concrete::{Code, Properties, tensile_strength},
         damage::Measure,
-        law::{Cracks, Setting},
+        law::Cracks,
         steel::Bar,
     },
-    mesh::{Locator, Mesh},
-    model::{
-        Action, Body, Drive, Load, March, MarchSettings, Matter, Model, Slipping, Steel, SteelKind,
-        System,
-    },
+    mesh::Locator,
+    model::{Slipping, Steel, SteelKind},
+    prelude::*,
 };
 use intrados_stage::Job;
 

@@ -12,11 +12,7 @@
 //! explains it, and the displacement measured holds some of the rig's. The load is what is
 //! compared.
 
-use intrados_mechanics::{
-    material::concrete::{Given, fracture_energy},
-    mesh::{Mesh, block, divide},
-    model::Model,
-};
+use intrados_mechanics::{material::concrete::fracture_energy, prelude::*};
 
 use super::*;
 

@@ -3,11 +3,7 @@
 //! MPa, f_y 440 MPa (hardly reached). Half of it is computed, on plates of 150 mm that the source
 //! does not give.
 
-use intrados_mechanics::{
-    material::concrete::Given,
-    mesh::{block, divide},
-    model::Model,
-};
+use intrados_mechanics::prelude::*;
 
 use super::*;
 
