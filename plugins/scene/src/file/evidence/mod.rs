@@ -39,7 +39,7 @@ use crate::{
 pub const SCHEMA: &str = "intrados.evidence/1";
 
 /// The name under which evidence is found beside a scene.
-pub const NAME: &str = "evidence.ron";
+pub(crate) const NAME: &str = "evidence.ron";
 
 /// Most rows of all tables of a file.
 const MAX_ROWS: usize = 200_000;
