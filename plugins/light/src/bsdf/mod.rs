@@ -134,7 +134,7 @@ impl Bsdf {
         }
     }
 
-    /// `eval` and `pdf` at once: cheaper than one after the other.
+    /// f·|cosθ_i| and the density of `sample` (per sr), deltas apart.
     #[inline]
     #[must_use]
     pub(crate) fn eval_pdf(&self, wo: Vec3, wi: Vec3, side: Side) -> (Vec3, f32) {

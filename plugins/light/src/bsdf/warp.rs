@@ -45,7 +45,7 @@ impl Frame {
     /// Local → world.
     #[inline]
     #[must_use]
-    pub(crate) fn to_world(&self, v: Vec3) -> Vec3 {
+    pub(crate) fn to_world(self, v: Vec3) -> Vec3 {
         self.x * v.x + self.y * v.y + self.z * v.z
     }
 }
