@@ -181,7 +181,7 @@ impl Rig {
         job: &Job,
     ) -> Result<Linear<'s, 'm>, GaugeError> {
         let cases = (0..self.tests.len())
-            .map(|i| structure.loads(moment(i), None))
+            .map(|i| structure.loads(moment(i)))
             .collect::<Result<Vec<_>, _>>()?;
         let locator = Locator::new(&structure.model.mesh);
         let gauges: Vec<Vec<Gauge>> = self.gauges.iter().map(|g| stretch(g.1, &locator)).collect();

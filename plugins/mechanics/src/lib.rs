@@ -38,8 +38,8 @@ pub mod prelude {
         material::{concrete::Given, law::Setting},
         mesh::{Mesh, block, divide},
         model::{
-            Action, Body, Drive, Elastic, Failure, Linear, Load, March, MarchSettings, Matter,
-            Model, System,
+            Action, Body, Control, Drive, Elastic, Failure, Linear, Load, March, MarchSettings,
+            Matter, Model, System,
         },
     };
 }

@@ -46,7 +46,7 @@ fn a_column_hands_its_load_to_its_bars() {
     );
     let structure = System::new(&prepared.model).unwrap();
     let foot: f64 = structure
-        .prescribed(history.time, None)
+        .prescribed(history.time)
         .iter()
         .filter(|p| p.1 == 1)
         .map(|p| history.force[3 * p.0 as usize + 1])

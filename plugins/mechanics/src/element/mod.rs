@@ -15,6 +15,7 @@
 //! | [`interface`] | joint of zero thickness between two faces |
 //! | [`spring`] | ground on a face |
 //! | [`shell`] | MITC4 shell with drilling rotations |
+//! | [`turn`] | what makes a brick, and steel in it, turn with what they are in |
 
 pub mod embed;
 pub mod hex8;
@@ -26,6 +27,7 @@ pub mod rod;
 pub(crate) mod scalar;
 pub(crate) mod shell;
 pub(crate) mod spring;
+pub(crate) mod turn;
 
 #[cfg(test)]
 mod bench_mesh;

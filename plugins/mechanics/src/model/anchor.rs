@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 
 use glam::DVec3;
 
-use super::{Failure, Steel, SteelKind, System, Trial};
+use super::{Failure, Steel, SteelKind, System, Trial, structure::Moved};
 use crate::{element::hex8, mesh::Locator};
 
 /// Points along an edge of a plate where its pressure is taken up; even, so that every point has
@@ -92,12 +92,13 @@ const SIGN: [f64; 2] = [-1.0, 1.0];
 impl System<'_> {
     /// How much more a piece strains than its host, because plates move otherwise than the points
     /// where it ends.
-    pub(super) fn seated(&self, bar: usize, piece: usize, x: &[f64]) -> f64 {
+    pub(super) fn seated(&self, bar: usize, piece: usize, moved: &Moved, x: &[f64]) -> f64 {
         let steel = &self.model.steel[bar];
         let of = &steel.pieces[piece];
         let along = (of.ends[1] - of.ends[0]).normalize_or_zero();
-        let pulled = |node: u32| (0..3).map(|c| along[c] * x[3 * node as usize + c]).sum::<f64>();
-        let host = &self.model.mesh.hexes[of.host].nodes;
+        let mesh = &self.model.mesh;
+        let pulled = |node: u32| along.dot(moved.node(mesh.nodes[node as usize], node, x));
+        let host = &mesh.hexes[of.host].nodes;
         let more = steel.plates(piece).map(|(end, plate)| {
             let point: f64 = host
                 .iter()
@@ -111,13 +112,20 @@ impl System<'_> {
     }
 
     /// The same of a whole tendon without bond, in the mean; nothing for other steel.
-    pub(super) fn seated_mean(&self, bar: usize, x: &[f64]) -> f64 {
+    pub(super) fn seated_mean(
+        &self,
+        bar: usize,
+        moved: impl Fn(usize) -> Moved,
+        x: &[f64],
+    ) -> f64 {
         let pieces = &self.model.steel[bar].pieces;
         let Some(last) = pieces.len().checked_sub(1) else { return 0.0 };
         let ends = if last == 0 { 0..1 } else { 0..2 };
         let longer: f64 = ends
             .map(|end| end * last)
-            .map(|piece| pieces[piece].length() * self.seated(bar, piece, x))
+            .map(|piece| {
+                pieces[piece].length() * self.seated(bar, piece, &moved(pieces[piece].host), x)
+            })
             .sum();
         longer / pieces.iter().map(crate::element::rod::Piece::length).sum::<f64>()
     }
@@ -127,7 +135,7 @@ impl System<'_> {
     pub(super) fn anchored(
         &self,
         [bar, piece]: [usize; 2],
-        host: &[f64; 24],
+        moved: &Moved,
         mean: f64,
         trial: Trial,
         x: &[f64],
@@ -144,7 +152,8 @@ impl System<'_> {
             .map_err(|source| Failure::Element { element: steel.name.clone(), source })?
             .to_vec();
         let strain =
-            row.iter().zip(host).map(|(r, u)| r * u).sum::<f64>() + self.seated(bar, piece, x);
+            row.iter().zip(&moved.local).map(|(r, u)| r * u).sum::<f64>()
+                + self.seated(bar, piece, moved, x);
         let along = (of.ends[1] - of.ends[0]).normalize_or_zero();
         for (end, plate) in steel.plates(piece) {
             let share =

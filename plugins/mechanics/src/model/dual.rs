@@ -107,7 +107,7 @@ impl System<'_> {
         let (mut matrix, mut force) = (self.matrix(), Vec::new());
         self.assemble(trial, &history.x, &mut matrix, &mut force, job)?;
         let mut constraints = Constraints::new(self.unknowns() / 3);
-        for (node, component, _) in self.prescribed(history.time, None) {
+        for (node, component, _) in self.prescribed(history.time) {
             constraints.fix(node as usize, usize::from(component), 0.0)?;
         }
         let mut solver = Solver::new(&matrix, &constraints, Method::Auto, job)?;
@@ -176,10 +176,11 @@ impl System<'_> {
     ) -> Result<([(Voigt, Tangent); 8], [f64; 24], hex8::Modes), Failure> {
         let mut answers = [([0.0; 6], [[0.0; 6]; 6]); 8];
         let mut modes = trial.history.modes[hex];
-        self.brick(hex, trial, &trial.history.x, &mut modes, |point, a| {
+        let u = self.moved(hex, trial.history, &trial.history.x)?.local;
+        self.brick(hex, trial, &u, &mut modes, |point, a| {
             answers[point] = (a.stress, a.tangent)
         })?;
-        Ok((answers, self.strained(hex, trial.history, &trial.history.x), modes))
+        Ok((answers, u, modes))
     }
 
     fn look(&self, gauge: &Gauge, history: &History) -> Result<Look, Failure> {
@@ -322,7 +323,13 @@ mod tests {
             let warmth = structure.warmth([history.time; 2]);
             let trial = Trial::still(history, &warmth);
             structure
-                .brick(hex, trial, &history.x, &mut history.modes[hex].clone(), |_, _| {})
+                .brick(
+                    hex,
+                    trial,
+                    &structure.displacements(hex, &history.x),
+                    &mut history.modes[hex].clone(),
+                    |_, _| {},
+                )
                 .unwrap()
                 .force
         };

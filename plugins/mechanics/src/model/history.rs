@@ -11,10 +11,13 @@ use crate::{element::hex8::Modes, material::steel::BarState};
 pub struct History {
     /// s.
     pub time: f64,
-    /// Factor of the load that is found rather than given ([`super::Drive::Indirect`]).
+    /// By which loads are raised beside their histories ([`super::Drive::Raised`]).
     pub factor: f64,
     /// Displacements (and rotations), three a node, m.
     pub x: Vec<f64>,
+    /// Whether bricks turn with what they are in: second order. Joints, springs, shells and rods
+    /// do not.
+    pub turned: bool,
     /// Internal forces, three a node, N: what supports bear where nothing else acts.
     pub force: Vec<f64>,
     /// One a brick.

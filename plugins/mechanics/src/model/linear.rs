@@ -69,13 +69,13 @@ impl<'m> System<'m> {
         let trial = Trial::still(&rest, &warmth);
         let bricks = (0..self.model.mesh.hexes.len()).into_par_iter().map(|e| {
             let mut modes = rest.modes[e];
-            Ok(self.brick(e, trial, &rest.x, &mut modes, |_, _| {})?.stiffness)
+            Ok(self.brick(e, trial, &[0.0; 24], &mut modes, |_, _| {})?.stiffness)
         });
         let bricks = bricks.collect::<Result<Vec<_>, Failure>>()?;
         let (mut sound, mut force) = (self.matrix(), Vec::new());
         self.assemble(trial, &rest.x, &mut sound, &mut force, job)?;
         let mut constraints = Constraints::new(self.unknowns() / 3);
-        for (node, component, _) in self.prescribed(time, None) {
+        for (node, component, _) in self.prescribed(time) {
             constraints.fix(node as usize, usize::from(component), 0.0)?;
         }
         let mean = |points: &Vec<Gauge>| -> Result<Vec<(usize, [f64; 24])>, Failure> {
@@ -109,7 +109,8 @@ impl<'m> System<'m> {
         let rest = self.rest(0.0);
         let warmth = [Vec::new(), Vec::new()];
         let mut modes = rest.modes[e];
-        let solid = self.brick(e, Trial::still(&rest, &warmth), &rest.x, &mut modes, |_, _| {})?;
+        let still = Trial::still(&rest, &warmth);
+        let solid = self.brick(e, still, &[0.0; 24], &mut modes, |_, _| {})?;
         let rows = hex8::rows(self.model.kind, &self.model.mesh.corners(host.hex), host.natural)
             .map_err(|why| self.of_hex(e, why))?;
         let (strains, along) = (rows.gauge(&solid.follow), gauge.along());
@@ -362,7 +363,7 @@ mod tests {
             vec![Gauge::Strain(host(1.2, 0.02, 0.14), DVec3::new(0.8, 0.6, 0.0))],
             vec![Gauge::Displacement(host(1.9, 0.1, 0.1), DVec3::Y)],
         ];
-        let cases = (0..2).map(|k| structure.loads(f64::from(k), None).unwrap()).collect();
+        let cases = (0..2).map(|k| structure.loads(f64::from(k)).unwrap()).collect();
         let mut linear = structure.linear(0.0, cases, &gauges, &Job::default()).unwrap();
         let n = linear.damages();
         let at: Vec<f64> = (0..n).map(|e| if e % 5 == 0 { 0.3 } else { 0.0 }).collect();

@@ -77,14 +77,24 @@ pub enum Drive {
     /// The loads, by their histories.
     #[default]
     Loads,
-    /// A weighted sum of displacements (an opening, a deflection): the factor of one load is found,
-    /// all others follow their histories.
-    Indirect {
-        /// Which load, of [`super::Model::loads`].
-        load: usize,
-        /// Node, component, weight.
-        row: Vec<(u32, u8, f64)>,
+    /// How far the structure moves: some loads are raised beside what their histories say, all in
+    /// one proportion, whose factor is found.
+    Raised {
+        /// Which, of [`super::Model::loads`], and how much of each one of the factor is.
+        loads: Vec<(usize, f64)>,
+        /// What is meant by how far.
+        control: Control,
     },
+}
+
+/// What tells how far a structure has moved.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Control {
+    /// A weighted sum of displacements (an opening, a deflection): node, component, weight.
+    Row(Vec<(u32, u8, f64)>),
+    /// All displacements along the direction of the step before (arc length, with the normal plane
+    /// of Riks 1979): it follows a structure that snaps back.
+    Arc,
 }
 
 /// One step that has converged.
@@ -92,7 +102,7 @@ pub enum Drive {
 pub struct Step {
     /// s.
     pub time: f64,
-    /// Of the load that is found ([`Drive::Indirect`]).
+    /// By which loads are raised ([`Drive::Raised`]).
     pub factor: f64,
     /// Newton iterations.
     pub iterations: usize,
@@ -227,6 +237,8 @@ struct Way<'s, 'm> {
     nonlocal: Option<Nonlocal>,
     /// Work so far, as [`MarchSettings::work`] counts it.
     spent: f64,
+    /// Where the last step went under [`Control::Arc`], of length 1; empty: there is none yet.
+    ahead: Vec<f64>,
 }
 
 /// Stiffness, and what solves with it.
@@ -250,8 +262,11 @@ struct Unbalanced {
 struct Goal {
     /// When, s.
     time: f64,
-    /// By so much the controlled sum of displacements is to grow.
+    /// By so much the controlled displacement is to grow.
     amount: f64,
+    /// Share of what is out of balance at the beginning that stays so: a step without duration has
+    /// nothing else that could be cut.
+    left: f64,
     /// See [`Trial::growth`].
     growth: Option<f64>,
     /// So many iterations must halve what is out of balance, or the attempt is given up.
@@ -268,8 +283,16 @@ struct Aim {
     reference: Vec<f64>,
     /// Held unknowns: which, value, and value for one unit of the load whose factor is found.
     held: Vec<(usize, f64, f64)>,
-    /// Value of the controlled sum at the end.
-    goal: f64,
+    /// Weights of displacements in what is controlled; empty: nothing is, or they are found.
+    row: Vec<(usize, f64)>,
+    /// By how much that is to grow from where the step begins.
+    amount: f64,
+    /// Displacements where the step begins, m.
+    begin: Vec<f64>,
+    /// See [`Goal::left`].
+    left: f64,
+    /// What is out of balance at the beginning; empty: not known yet, or of no interest.
+    at_first: Vec<f64>,
     /// What one of the factor counts among displacements, m.
     unit: f64,
 }
@@ -308,6 +331,7 @@ impl<'s, 'm> March<'s, 'm> {
                 system,
                 nonlocal: Nonlocal::new(structure),
                 spent: 0.0,
+                ahead: Vec::new(),
             },
         }
     }
@@ -319,8 +343,8 @@ impl<'s, 'm> March<'s, 'm> {
         self.way.system.solver.as_ref().is_some_and(Solver::fell_back)
     }
 
-    /// To the time `to`, by as few steps as converge; under [`Drive::Indirect`] the controlled sum
-    /// of displacements grows by `amount` on the way. `each` hears every equilibrium.
+    /// To the time `to`, by as few steps as converge; under [`Drive::Raised`] the controlled
+    /// displacement grows by `amount` on the way. `each` hears every equilibrium.
     ///
     /// # Errors
     /// [`Failure`]; the history stays at the last equilibrium.
@@ -338,14 +362,16 @@ impl<'s, 'm> March<'s, 'm> {
             let time = if next == 1.0 { to } else { begin + next * (to - begin) };
             let before = history.born.clone();
             way.structure.bear(history, time);
-            let goal =
-                Goal { time, amount: (next - done) * amount, growth: None, patience: PATIENCE };
+            let left = if to > begin { 0.0 } else { (1.0 - next) / (1.0 - done) };
+            let amount = (next - done) * amount;
+            let goal = Goal { time, amount, left, growth: None, patience: PATIENCE };
             let mut tried = way.attempt(history, &goal, job);
             if matches!(tried, Ok(Err(_))) && part <= JUMP {
                 tried = way.avalanche(history, &goal, job);
             }
             match tried.map_err(|why| way.structure.labelled(why))? {
                 Ok((found, step)) => {
+                    way.look_ahead(history, &found);
                     *history = found;
                     each(history, &step)?;
                     done = next;
@@ -407,6 +433,16 @@ impl Way<'_, '_> {
         Ok(Err(why))
     }
 
+    /// Keeps the direction in which a step went.
+    fn look_ahead(&mut self, from: &History, to: &History) {
+        let is_arc = matches!(self.drive, Drive::Raised { control: Control::Arc, .. });
+        let moved: Vec<f64> = to.x.iter().zip(&from.x).map(|(b, a)| b - a).collect();
+        let length = norm(&moved);
+        if is_arc && length > 0.0 {
+            self.ahead = moved.into_iter().map(|x| x / length).collect();
+        }
+    }
+
     fn stuck(&self, time: f64, why: &Unbalanced) -> Failure {
         let (node, axis) = ((why.worst / 3) as u32, why.worst % 3);
         let (node, quantity) = match self.structure.rotations.owner(node) {
@@ -427,8 +463,8 @@ impl Way<'_, '_> {
 
     /// One step. The inner error: not to be had in one.
     fn attempt(&mut self, history: &History, goal: &Goal, job: &Job) -> Attempt {
-        let &Goal { time, amount, growth, patience } = goal;
-        let Self { structure, settings, drive, system, nonlocal, spent } = self;
+        let &Goal { time, growth, patience, .. } = goal;
+        let Self { structure, settings, drive, system, nonlocal, spent, ahead } = self;
         let warmth = structure.warmth([history.time, time]);
         let (trial, mut field) = (
             Trial { time, warmth: &warmth, growth, hold: HOLD, ..Trial::still(history, &warmth) },
@@ -436,7 +472,7 @@ impl Way<'_, '_> {
         );
         let tolerance =
             if growth.is_some() { settings.tolerance.max(GIVEN) } else { settings.tolerance };
-        let aim = Aim::new(structure, drive, history, time, amount)?;
+        let mut aim = Aim::new(structure, drive, history, goal, ahead)?;
         let (mut x, mut factor, mut force) = (history.x.clone(), history.factor, Vec::new());
         let (mut scale, mut linear, mut best, mut earlier) = (0.0, 0, f64::INFINITY, f64::INFINITY);
         let mut anderson = Anderson::default();
@@ -458,7 +494,7 @@ impl Way<'_, '_> {
                 }
                 Err(other) => return Err(other),
             }
-            let balance = aim.balance(drive, &x, factor, &force, &mut scale);
+            let balance = aim.balance(&x, factor, &force, &mut scale);
             let residual = balance.residual;
             let enough =
                 tolerance * if iteration == settings.iterations { settings.loose } else { 1.0 };
@@ -467,7 +503,7 @@ impl Way<'_, '_> {
                     Step { time, factor, iterations: iteration, linear, residual, avalanche: 0 };
                 return Ok(Ok((structure.commit(trial, x, factor, force)?, step)));
             }
-            let unbalanced = || Unbalanced { residual, worst: aim.worst(&balance.out) };
+            let unbalanced = |aim: &Aim| Unbalanced { residual, worst: aim.worst(&balance.out) };
             let diverges =
                 !residual.is_finite() || (iteration > 3 && residual > 1e3 * f64::max(best, 1e-3));
             let stalls = iteration > 0
@@ -482,7 +518,7 @@ impl Way<'_, '_> {
                 return Ok(Ok((structure.commit(trial, x, factor, force)?, step)));
             }
             if iteration == settings.iterations || diverges || stalls {
-                return Ok(Err(unbalanced()));
+                return Ok(Err(unbalanced(&aim)));
             }
             if residual > 4.0 * best {
                 anderson.restart();
@@ -494,7 +530,7 @@ impl Way<'_, '_> {
             if balance.rests || !aim.reference.is_empty() {
                 best = best.min(residual);
             }
-            match system.correct(structure, drive, &aim, &balance.out, &x, factor, job) {
+            match system.correct(structure, &mut aim, &balance.out, &x, factor, job) {
                 Ok((step, iterations)) => {
                     linear += iterations;
                     *spent += (iterations as f64 + ASSEMBLY) * structure.unknowns() as f64;
@@ -514,7 +550,7 @@ impl Way<'_, '_> {
                     | SolveError::Singular { .. }
                     | SolveError::Floating { .. },
                 )) if iteration > 0 => {
-                    return Ok(Err(unbalanced()));
+                    return Ok(Err(unbalanced(&aim)));
                 }
                 Err(other) => return Err(other),
             }
@@ -528,42 +564,63 @@ impl Aim {
         structure: &System,
         drive: &Drive,
         history: &History,
-        time: f64,
-        amount: f64,
+        goal: &Goal,
+        ahead: &[f64],
     ) -> Result<Self, Failure> {
-        let apart = match drive {
-            Drive::Loads => None,
-            Drive::Indirect { load, .. } => Some(*load),
-        };
-        let given = structure.loads(time, apart)?;
+        let &Goal { time, amount, left, .. } = goal;
         let mut held: Vec<_> = structure
-            .prescribed(time, apart)
+            .prescribed(time)
             .into_iter()
             .map(|(n, c, v)| (unknown(n, c), v, 0.0))
             .collect();
-        let mut reference = Vec::new();
-        if let Some(action) = apart.map(|load| &structure.model.loads[load].action) {
+        let (mut reference, mut row) = (Vec::new(), Vec::new());
+        if let Drive::Raised { loads, control } = drive {
             reference = vec![0.0; structure.unknowns()];
-            structure.add_load(action, 1.0, time, &mut reference)?;
-            if let Action::Displacement(values) = action {
-                held.extend(values.iter().map(|&(n, c, v)| (unknown(n, c), 0.0, v)));
+            for &(load, share) in loads {
+                let action = &structure.model.loads[load].action;
+                structure.add_load(action, share, time, &mut reference)?;
+                if let Action::Displacement(values) = action {
+                    held.extend(values.iter().map(|&(n, c, v)| (unknown(n, c), 0.0, share * v)));
+                }
             }
+            row = match control {
+                Control::Row(row) => row.iter().map(|&(n, c, w)| (unknown(n, c), w)).collect(),
+                Control::Arc => ahead.iter().copied().enumerate().collect(),
+            };
         }
-        let unit = if amount == 0.0 { 1e-3 } else { amount.abs() };
+        // What several loads prescribe for one displacement adds up.
+        held.sort_by_key(|h| h.0);
+        held.dedup_by(|b, a| {
+            let same = a.0 == b.0 && (a.2 != 0.0 || b.2 != 0.0);
+            if same {
+                (a.1, a.2) = (a.1 + b.1, a.2 + b.2);
+            }
+            same
+        });
+        held.iter_mut().for_each(|h| h.1 += left * (history.x[h.0] - h.1 - history.factor * h.2));
         Ok(Self {
-            given,
+            given: structure.loads(time)?,
             pressing: structure.pressing(time)?,
             reference,
             held,
-            goal: controlled(drive, &history.x) + amount,
-            unit,
+            row,
+            amount,
+            begin: history.x.clone(),
+            left,
+            at_first: Vec::new(),
+            unit: if amount == 0.0 { 1e-3 } else { amount.abs() },
         })
+    }
+
+    /// How much is missing of what the controlled displacement is to grow by.
+    fn missing(&self, x: &[f64]) -> f64 {
+        let grown: f64 = self.row.iter().map(|&(i, w)| w * (x[i] - self.begin[i])).sum();
+        self.amount - grown
     }
 
     /// What is out of balance at `x`; `scale` keeps the largest of all that has acted in this step.
     fn balance(
-        &self,
-        drive: &Drive,
+        &mut self,
         x: &[f64],
         factor: f64,
         force: &[f64],
@@ -572,7 +629,13 @@ impl Aim {
         let acting: Vec<f64> = (0..x.len())
             .map(|i| self.given[i] + self.reference.get(i).map_or(0.0, |r| factor * r))
             .collect();
-        let out: Vec<f64> = acting.iter().zip(force).map(|(a, f)| a - f).collect();
+        let mut out: Vec<f64> = acting.iter().zip(force).map(|(a, f)| a - f).collect();
+        if self.left > 0.0 {
+            if self.at_first.is_empty() {
+                self.at_first.clone_from(&out);
+            }
+            out.iter_mut().zip(&self.at_first).for_each(|(out, first)| *out -= self.left * first);
+        }
         let mut free = out.clone();
         self.held.iter().for_each(|h| free[h.0] = 0.0);
         // What supports bear counts as acting, and what the ground presses with; so does what is
@@ -588,7 +651,8 @@ impl Aim {
         let at_ease = |distance: f64| distance.abs() <= 1e-9 * size;
         let rests =
             self.held.iter().all(|&(i, v, by_factor)| at_ease(v + factor * by_factor - x[i]))
-                && (self.reference.is_empty() || at_ease(self.goal - controlled(drive, x)));
+                && (self.reference.is_empty()
+                    || (!self.row.is_empty() && at_ease(self.missing(x))));
         Balance { out, residual: if *scale > 0.0 { free / *scale } else { 0.0 }, rests }
     }
 
@@ -620,8 +684,7 @@ impl Equations {
     fn correct(
         &mut self,
         structure: &System,
-        drive: &Drive,
-        aim: &Aim,
+        aim: &mut Aim,
         out: &[f64],
         x: &[f64],
         factor: f64,
@@ -645,8 +708,12 @@ impl Equations {
         let unit = aim.constraints(nodes, |_, _, by_factor| by_factor)?;
         let along = solver.solve(&self.matrix, &aim.reference, &unit, self.tolerance, job)?;
         linear += along.iterations;
-        let missing = aim.goal - controlled(drive, x) - controlled(drive, &step);
-        let more = Some(missing / controlled(drive, &along.x))
+        if aim.row.is_empty() {
+            let length = norm(&along.x);
+            aim.row = along.x.iter().map(|x| x / length).enumerate().collect();
+        }
+        let dot = |x: &[f64]| aim.row.iter().map(|&(i, w)| w * x[i]).sum::<f64>();
+        let more = Some((aim.missing(x) - dot(&step)) / dot(&along.x))
             .filter(|more| more.is_finite())
             .unwrap_or(0.0);
         add(&mut step, more, &along.x);
@@ -658,16 +725,6 @@ impl Equations {
 /// The number of a component of a node.
 fn unknown(node: u32, component: u8) -> usize {
     3 * node as usize + usize::from(component)
-}
-
-/// The controlled sum of displacements.
-fn controlled(drive: &Drive, x: &[f64]) -> f64 {
-    match drive {
-        Drive::Loads => 0.0,
-        Drive::Indirect { row, .. } => {
-            row.iter().map(|&(node, component, w)| w * x[unknown(node, component)]).sum()
-        }
-    }
 }
 
 fn norm(v: &[f64]) -> f64 {

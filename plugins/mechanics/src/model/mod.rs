@@ -25,7 +25,7 @@ pub use ground::{Bedding, Ground};
 pub use history::History;
 pub use law::{Elastic, Matter, Memory, Record};
 pub use linear::Linear;
-pub use march::{Drive, Failure, March, MarchSettings, Step};
+pub use march::{Control, Drive, Failure, March, MarchSettings, Step};
 pub use nonlocal::Regularisation;
 pub(crate) use steel::JACKING;
 pub use steel::{Piecework, Rust, Slipping, Steel, SteelKind, Tendon};

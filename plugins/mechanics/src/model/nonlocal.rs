@@ -121,8 +121,9 @@ impl Nonlocal {
         assemble_vector::<1, Failure>(&self.elements, &mut right, job, |e, f| {
             if there[mesh.hexes[e].region as usize] {
                 let (mut local, mut modes) = ([0.0; 8], trial.history.modes[e]);
+                let u = structure.moved(e, trial.history, x)?.local;
                 structure
-                    .brick(e, trial, x, &mut modes, |point, answer| local[point] = answer.local)?;
+                    .brick(e, trial, &u, &mut modes, |point, answer| local[point] = answer.local)?;
                 let source = scalar::source(&mesh.corners(e as u32), |point| local[point]);
                 f.copy_from_slice(&source.map_err(|why| structure.of_hex(e, why))?);
             }

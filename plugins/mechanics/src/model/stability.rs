@@ -54,7 +54,7 @@ impl System<'_> {
         let (mut matrix, mut force) = (self.matrix(), Vec::new());
         self.assemble(Trial::still(&rest, &warmth), &rest.x, &mut matrix, &mut force, job)?;
         let mut constraints = Constraints::new(self.unknowns() / 3);
-        let held = self.prescribed(history.time, None);
+        let held = self.prescribed(history.time);
         for &(node, component, _) in &held {
             constraints.fix(node as usize, usize::from(component), 0.0)?;
         }

@@ -20,6 +20,7 @@ use crate::{
         interface,
         load::{self, Face},
         quad::Quadrature,
+        turn::Turn,
     },
     mesh::{ElementId, HexFace},
     sparse::{BlockMatrix, Connectivity, Pattern, Place},
@@ -158,6 +159,7 @@ impl<'m> System<'m> {
         History {
             time,
             factor: 0.0,
+            turned: false,
             x: vec![0.0; self.unknowns()],
             force: vec![0.0; self.unknowns()],
             modes: vec![Modes::default(); hexes],
@@ -256,15 +258,15 @@ impl<'m> System<'m> {
     }
 
     /// What acts at a time, three a node, N. Prescribed displacements and temperatures are no
-    /// forces. Of the load `apart` nothing is counted.
+    /// forces.
     ///
     /// # Errors
     /// If an element is folded.
-    pub fn loads(&self, time: f64, apart: Option<usize>) -> Result<Vec<f64>, Failure> {
+    pub fn loads(&self, time: f64) -> Result<Vec<f64>, Failure> {
         let mut sum = vec![0.0; self.unknowns()];
-        for (i, load) in self.model.loads.iter().enumerate() {
+        for load in &self.model.loads {
             let factor = load.factor(time);
-            if factor != 0.0 && apart != Some(i) {
+            if factor != 0.0 {
                 self.add_load(&load.action, factor, time, &mut sum)?;
             }
         }
@@ -318,12 +320,12 @@ impl<'m> System<'m> {
         self.add_thin_load(action, time, add)
     }
 
-    /// What is prescribed at a time: every held unknown with its value, m; not by the load `apart`.
+    /// What is prescribed at a time: every held unknown with its value, m.
     #[must_use]
-    pub fn prescribed(&self, time: f64, apart: Option<usize>) -> Vec<(u32, u8, f64)> {
+    pub fn prescribed(&self, time: f64) -> Vec<(u32, u8, f64)> {
         let holds = self.model.holds.iter().map(|&(node, component)| (node, component, 0.0));
         let mut all: Vec<_> = holds.chain(self.slips.held()).collect();
-        for (_, load) in self.model.loads.iter().enumerate().filter(|(i, _)| apart != Some(*i)) {
+        for load in &self.model.loads {
             if let Action::Displacement(values) = &load.action {
                 let factor = load.factor(time);
                 all.extend(
@@ -367,16 +369,18 @@ impl<'m> System<'m> {
         matrix.clear();
         force.clear();
         force.resize(self.unknowns(), 0.0);
-        let means = self.mean_strains(x);
+        let means = self.mean_strains(trial.history, x);
         let [hexes, pieces, joints] =
             [self.model.mesh.hexes.len(), self.pieces.len(), self.model.mesh.interfaces.len()];
         matrix.assemble_with(&self.elements, force, job, |e, k, f| {
             if e < hexes {
                 if self.is_alive(e, trial.time) {
                     let mut modes = trial.history.modes[e];
-                    let solid = self.brick(e, trial, x, &mut modes, |_, _| {})?;
+                    let moved = self.moved(e, trial.history, x)?;
+                    let solid = self.brick(e, trial, &moved.local, &mut modes, |_, _| {})?;
                     k.copy_from_slice(solid.stiffness.as_flattened());
                     f.copy_from_slice(&solid.force);
+                    self.bring_back(e, &moved, [].into_iter(), x, k, f);
                 }
                 return Ok(());
             }
@@ -389,26 +393,26 @@ impl<'m> System<'m> {
                 );
                 if self.is_alive(host, trial.time) {
                     let before = &trial.history.steel[bar as usize][piece as usize];
-                    let u = self.strained(host, trial.history, x);
+                    let moved = self.moved(host, trial.history, x)?;
                     let (this, mean) = ([bar as usize, piece as usize], means[bar as usize]);
-                    if self.slipping(this, &u, trial, x, k, f)?
-                        || self.anchored(this, &u, mean, trial, x, k, f)?
+                    if !self.slipping(this, &moved.local, trial, x, k, f)?
+                        && !self.anchored(this, &moved, mean, trial, x, k, f)?
                     {
-                        return Ok(());
+                        let element = steel.element(
+                            piece as usize,
+                            &moved.local,
+                            mean,
+                            before,
+                            [trial.history.time, trial.time],
+                        );
+                        let element = element.map_err(|source| Failure::Element {
+                            element: steel.name.clone(),
+                            source,
+                        })?;
+                        k.copy_from_slice(element.stiffness.as_flattened());
+                        f.copy_from_slice(&element.force);
                     }
-                    let element = steel.element(
-                        piece as usize,
-                        &u,
-                        mean,
-                        before,
-                        [trial.history.time, trial.time],
-                    );
-                    let element = element.map_err(|source| Failure::Element {
-                        element: steel.name.clone(),
-                        source,
-                    })?;
-                    k.copy_from_slice(element.stiffness.as_flattened());
-                    f.copy_from_slice(&element.force);
+                    self.bring_back(host, &moved, steel.under(piece as usize), x, k, f);
                 }
                 return Ok(());
             }
@@ -454,7 +458,8 @@ impl<'m> System<'m> {
                 let (mut modes, mut memory) =
                     (trial.history.modes[e], trial.history.points[e].clone());
                 if self.is_alive(e, trial.time) {
-                    self.brick(e, trial, &x, &mut modes, |point, answer| {
+                    let u = self.moved(e, trial.history, &x)?.local;
+                    self.brick(e, trial, &u, &mut modes, |point, answer| {
                         if let (Memory::Concrete(points), Some(record)) =
                             (&mut memory, answer.state)
                         {
@@ -466,7 +471,7 @@ impl<'m> System<'m> {
             })
             .collect::<Result<_, Failure>>()?;
         let (modes, points) = after.into_iter().unzip();
-        let means = self.mean_strains(&x);
+        let means = self.mean_strains(trial.history, &x);
         let mut steel = trial.history.steel.clone();
         for (bar, works) in steel.iter_mut().enumerate() {
             let of = &self.model.steel[bar];
@@ -475,13 +480,13 @@ impl<'m> System<'m> {
                 .enumerate()
                 .filter(|(piece, _)| self.is_alive(of.pieces[*piece].host, trial.time))
             {
-                let u = self.strained(of.pieces[piece].host, trial.history, &x);
+                let moved = self.moved(of.pieces[piece].host, trial.history, &x)?;
                 let row = of.pieces[piece]
                     .strain_row()
                     .map_err(|source| Failure::Element { element: of.name.clone(), source })?;
-                let strain = row.iter().zip(&u).map(|(r, u)| r * u).sum::<f64>()
+                let strain = row.iter().zip(&moved.local).map(|(r, u)| r * u).sum::<f64>()
                     + self.stretch(bar, piece, &x)
-                    + self.seated(bar, piece, &x);
+                    + self.seated(bar, piece, &moved, &x);
                 let bond = self.bonded(bar, piece, &x, work.bond);
                 *work =
                     of.answer(piece, strain, means[bar], work, [trial.history.time, trial.time]).2;
@@ -499,6 +504,7 @@ impl<'m> System<'m> {
         Ok(History {
             time: trial.time,
             factor,
+            turned: trial.history.turned,
             x,
             force,
             modes,
@@ -537,7 +543,8 @@ impl<'m> System<'m> {
         let mut points = [Point::default(); 8];
         if self.is_alive(hex, trial.time) {
             let mut modes = trial.history.modes[hex];
-            self.brick(hex, trial, &trial.history.x, &mut modes, |point, answer| {
+            let u = self.moved(hex, trial.history, &trial.history.x)?.local;
+            self.brick(hex, trial, &u, &mut modes, |point, answer| {
                 let damage = answer.state.map_or([0.0; 2], |record| record.state.damage);
                 points[point] = Point { stress: answer.stress, damage, crack: answer.crack };
             })?;
@@ -546,9 +553,14 @@ impl<'m> System<'m> {
     }
 
     /// Mean strains of tendons without bond.
-    fn mean_strains(&self, x: &[f64]) -> Vec<f64> {
+    fn mean_strains(&self, history: &History, x: &[f64]) -> Vec<f64> {
+        // A folded brick is refused where it is assembled.
+        let moved = |host: usize| {
+            let local = self.displacements(host, x);
+            self.turned(host, history, local).unwrap_or(Moved { local, turn: None })
+        };
         let mean = |(bar, steel): (usize, &super::Steel)| {
-            steel.mean_strain(|host| self.displacements(host, x)) + self.seated_mean(bar, x)
+            steel.mean_strain(|host| moved(host).local) + self.seated_mean(bar, moved, x)
         };
         self.model.steel.iter().enumerate().map(mean).collect()
     }
@@ -596,17 +608,17 @@ impl<'m> System<'m> {
         })
     }
 
-    /// A brick at displacements `x`; `each` hears what its points answer.
+    /// A brick at displacements `u` of its nodes ([`Moved::local`]); `each` hears what its points
+    /// answer.
     pub(super) fn brick(
         &self,
         hex: usize,
         trial: Trial,
-        x: &[f64],
+        u: &[f64; 24],
         modes: &mut Modes,
         mut each: impl FnMut(usize, &Answer),
     ) -> Result<hex8::Solid, Failure> {
         let cell = &self.model.mesh.hexes[hex];
-        let u = self.strained(hex, trial.history, x);
         let neutral = self.model.temperature;
         let warm = trial
             .warmth
@@ -647,9 +659,9 @@ impl<'m> System<'m> {
         let corners = self.model.mesh.corners(hex as u32);
         let solid =
             if self.model.kind == Kind::Incompatible && trial.history.points[hex].is_damaged() {
-                stiffened(&corners, &u, modes, law)
+                stiffened(&corners, u, modes, law)
             } else {
-                hex8::integrate(self.model.kind, &corners, &u, modes, law)
+                hex8::integrate(self.model.kind, &corners, u, modes, law)
             };
         solid.map_err(|e| self.of_hex(hex, e))
     }
@@ -663,13 +675,60 @@ impl<'m> System<'m> {
         std::array::from_fn(|i| x[3 * nodes[i / 3] as usize + i % 3])
     }
 
-    /// The same, counted from where the brick was born.
-    pub(super) fn strained(&self, hex: usize, history: &History, x: &[f64]) -> [f64; 24] {
-        since_birth(history, hex as u32, self.displacements(hex, x))
+    /// The same as its strain counts them.
+    ///
+    /// # Errors
+    /// If it is folded where it turns.
+    pub(super) fn moved(&self, hex: usize, history: &History, x: &[f64]) -> Result<Moved, Failure> {
+        self.turned(hex, history, since_birth(history, hex as u32, self.displacements(hex, x)))
+    }
+
+    /// The same from displacements of its nodes.
+    fn turned(&self, hex: usize, history: &History, u: [f64; 24]) -> Result<Moved, Failure> {
+        if !history.turned {
+            return Ok(Moved { local: u, turn: None });
+        }
+        let corners = self.model.mesh.corners(hex as u32);
+        let turn = Turn::of(&corners, &u).ok_or(self.of_hex(hex, ElementError::NotFinite))?;
+        Ok(Moved { local: turn.locals(&corners, &u), turn: Some(turn) })
+    }
+
+    /// Brings stiffness and force on a brick, and on more nodes after its own, back into the world.
+    fn bring_back(
+        &self,
+        hex: usize,
+        moved: &Moved,
+        more: impl Iterator<Item = u32>,
+        x: &[f64],
+        k: &mut [f64],
+        f: &mut [f64],
+    ) {
+        let Some(turn) = &moved.turn else { return };
+        let mesh = &self.model.mesh;
+        let own = moved.local.as_chunks::<3>().0.iter().map(|&u| DVec3::from_array(u));
+        let own = mesh.corners(hex as u32).into_iter().zip(own);
+        let more = more.map(|n| (mesh.nodes[n as usize], moved.node(mesh.nodes[n as usize], n, x)));
+        turn.bring_back(&own.chain(more).collect::<Vec<_>>(), k, f);
     }
 
     pub(super) fn of_hex(&self, hex: usize, source: ElementError) -> Failure {
         Failure::Element { element: self.model.mesh.name(ElementId::Hex(hex as u32)), source }
+    }
+}
+
+/// How a brick has moved.
+pub(super) struct Moved {
+    /// Displacements of its nodes counted from where it was born, and, where it turns, in axes that
+    /// turn with it, m.
+    pub(super) local: [f64; 24],
+    turn: Option<Turn>,
+}
+
+impl Moved {
+    /// Displacement of a node at `place` in the brick's axes, m.
+    pub(super) fn node(&self, place: DVec3, node: u32, x: &[f64]) -> DVec3 {
+        let u = DVec3::from_array(std::array::from_fn(|c| x[3 * node as usize + c]));
+        self.turn.as_ref().map_or(u, |turn| turn.local(place, u))
     }
 }
 

@@ -12,7 +12,7 @@ use crate::{
         law::{Cracks, Setting},
     },
     mesh::block,
-    model::{Action, Drive, Load, March, MarchSettings, Matter, Model, System},
+    model::{Action, Control, Drive, Load, March, MarchSettings, Matter, Model, System},
 };
 
 const LENGTH: f64 = 0.1;
@@ -50,13 +50,16 @@ fn torn(n: usize, cracks: Cracks, energy: f64, job: &Job) -> Result<[f64; 2], Tr
     hold(&mut model, 2, |p| near(p.z, 0.0));
     let end = model.mesh.node_sets["x1"].clone();
     let pull = end.iter().map(|&n| (n, 0.25 * DVec3::X)).collect();
-    model.loads.push(Load { name: "pull".into(), action: Action::Nodes(pull), history: vec![] });
+    model.loads.push(Load { name: "pull".into(), action: Action::Nodes(pull), history: vec![(0.0, 0.0)] });
     let sides = [
         node(&model.mesh, DVec3::new(weak + h, 0.0, 0.0))?,
         node(&model.mesh, DVec3::new(weak, 0.0, 0.0))?,
     ];
     let structure = System::new(&model)?;
-    let drive = Drive::Indirect { load: 0, row: vec![(sides[0], 0, 1.0), (sides[1], 0, -1.0)] };
+    let drive = Drive::Raised {
+        loads: vec![(0, 1.0)],
+        control: Control::Row(vec![(sides[0], 0, 1.0), (sides[1], 0, -1.0)]),
+    };
     let settings = MarchSettings { tolerance: 1e-5, ..MarchSettings::default() };
     let mut march = March::new(&structure, structure.rest(0.0), drive, settings);
     // To five times G_f/f_t: MC2010's curve, that of planes, ends there; of the exponential one

@@ -13,6 +13,7 @@ mod shells;
 mod solids;
 mod tendons;
 mod time;
+mod turning;
 
 use std::time::Instant;
 
@@ -67,7 +68,7 @@ type Checks = Result<Vec<Check>, Trouble>;
 /// A part of the battery: its name in case that it fails, and its checks.
 type Part = (&'static str, fn(&Job) -> Checks);
 
-const PARTS: [Part; 25] = [
+const PARTS: [Part; 28] = [
     ("patch test", solids::patch),
     ("cantilever", solids::cantilever),
     ("Lamé's cylinder", solids::lame),
@@ -92,6 +93,9 @@ const PARTS: [Part; 25] = [
     ("anchor plate", tendons::bursting),
     ("localisation in a bar", crack::localisation),
     ("Janssen's joint", crack::janssen),
+    ("column of second order", turning::beam_column),
+    ("elastica", turning::elastica),
+    ("buckled column", turning::buckled),
     ("dual", dual::softening),
 ];
 

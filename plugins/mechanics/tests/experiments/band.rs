@@ -47,7 +47,7 @@ fn torn(n: usize, slim: f64, angle: f64) -> f64 {
     let structure = System::new(&model).unwrap();
     let settings = MarchSettings { tolerance: 1e-5, ..MarchSettings::default() };
     let mut march =
-        March::new(&structure, structure.rest(0.0), Drive::Indirect { load: 0, row }, settings);
+        March::new(&structure, structure.rest(0.0), raised(0, row), settings);
     let (mut work, mut opened, mut before) = (0.0, 0.0, [0.0; 2]);
     for k in 0..=100 {
         let opening = 1e-7 * f64::powf(5.0 * FRACTURE / STRENGTH / 1e-7, f64::from(k) / 100.0);

@@ -150,13 +150,18 @@ fn kilonewton(nodes: &[u32], direction: DVec3) -> Load {
     Load {
         name: "force".into(),
         action: Action::Nodes(nodes.iter().map(|&n| (n, each)).collect()),
-        history: vec![],
+        history: vec![(0.0, 0.0)],
     }
 }
 
 /// The mean displacement of nodes along `direction`.
 fn mean(nodes: &[u32], component: u8, sign: f64) -> Vec<(u32, u8, f64)> {
     nodes.iter().map(|&n| (n, component, sign / nodes.len() as f64)).collect()
+}
+
+/// Raises one load along a weighted sum of displacements.
+fn raised(load: usize, row: Vec<(u32, u8, f64)>) -> Drive {
+    Drive::Raised { loads: vec![(load, 1.0)], control: Control::Row(row) }
 }
 
 /// What became of a member that was pushed.
@@ -176,7 +181,7 @@ fn pushed(model: &Model, load: usize, row: Vec<(u32, u8, f64)>, step: f64, last:
     let tolerance = std::env::var("EXPERIMENT_TOLERANCE").map_or(1e-2, |t| t.parse().unwrap());
     let settings =
         MarchSettings { tolerance, loose: 3.0, iterations: 40, ..MarchSettings::default() };
-    let drive = Drive::Indirect { load, row: row.clone() };
+    let drive = raised(load, row.clone());
     let mut march = March::new(&structure, structure.rest(0.0), drive, settings);
     let (mut curve, mut yields, mut peak, mut steps, mut jumps) =
         (vec![(0.0, 0.0)], None, 0.0_f64, 0, 0);
