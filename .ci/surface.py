@@ -13,7 +13,7 @@ ITEM = re.compile(r"^\s*pub (?:const |async )?(fn|struct|enum|trait|type|mod|con
 lines = []
 for folder in sorted([ROOT / "app", *(ROOT / "plugins").iterdir()]):
     for page in sorted(folder.glob("src/**/*.rs")):
-        text = page.read_text().split("\n#[cfg(test)]\nmod tests")[0]
+        text = page.read_text().split("\n#[cfg(test)]\nmod tests {")[0]
         place = page.relative_to(ROOT).as_posix()
         lines += sorted(f"{place}: {kind} {name}" for kind, name in ITEM.findall(text))
 text = "\n".join(lines) + "\n"

@@ -1,7 +1,7 @@
 //! `intrados view`: the window.
 
 #[cfg(feature = "desktop")]
-use std::{path::Path, sync::Arc};
+use std::{error::Error, path::Path, sync::Arc};
 
 use clap::CommandFactory;
 #[cfg(feature = "desktop")]
@@ -64,7 +64,7 @@ fn open(session: &Session, args: &View) -> Result<Outcome, Failure> {
 
 /// The picture of the window as EXR, as `intrados render` writes it.
 #[cfg(feature = "desktop")]
-fn write_exr(render: &Render, path: &Path) -> Result<(), String> {
+fn write_exr(render: &Render, path: &Path) -> Result<(), Box<dyn Error + Send + Sync>> {
     let scene = &render.lit().scene;
     let facts = vec![
         ("intrados.version", env!("CARGO_PKG_VERSION").to_owned()),
@@ -74,9 +74,7 @@ fn write_exr(render: &Render, path: &Path) -> Result<(), String> {
         ("intrados.samples", format!("{}", render.samples_per_pixel())),
         ("intrados.unit", "W/(m2 sr)".to_owned()),
     ];
-    picture::exr(render.plate(), &facts)
-        .and_then(|bytes| output::put(path, &bytes))
-        .map_err(|failure| failure.to_string())
+    Ok(picture::exr(render.plate(), &facts).and_then(|bytes| output::put(path, &bytes))?)
 }
 
 /// A bundled scene may be named by its path in the repository.

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use bevy_app::{App, Plugin};
-use intrados_damage::{AddEvidence, Cause, Evidence, EvidenceSource, EvidenceError, Said, zone::{ZONES, Zones, zone_at}};
+use intrados_damage::prelude::*;
 use intrados_scene::Scene;
 use intrados_stage::{Estimate, Job, access};
 use serde::Deserialize;

@@ -6,10 +6,7 @@ use bevy_app::{App, Plugin, Update};
 use bevy_ecs::prelude::*;
 use glam::Vec3;
 use intrados_light::Measurement;
-use intrados_scene::{
-    Meter, Scene,
-    plugin::{CurrentScene, FromScene, SceneChanged},
-};
+use intrados_scene::prelude::*;
 use intrados_stage::Stage;
 
 pub use hammer::{HammerPlugin, TABLE};
@@ -118,8 +115,6 @@ fn panel(InMut(ui): InMut<egui::Ui>, light: Res<WorkLight>) {
 /// The scene cannot be opened.
 pub fn read(app: &mut App, scene: std::path::PathBuf, frames: usize) -> anyhow::Result<WorkLight> {
     use bevy_ecs::message::Messages;
-    use intrados_scene::plugin::{OpenScene, SceneFailed};
-
     app.world_mut().remove_resource::<Measurement>();
     app.world_mut().write_message(OpenScene(scene));
     let mut read = 0;

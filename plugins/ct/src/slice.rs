@@ -98,7 +98,7 @@ impl Slices {
 
     /// What the file says of its pixels where that contradicts what was given, in words.
     #[must_use]
-    pub fn contradiction(&self) -> Option<String> {
+    pub(crate) fn contradiction(&self) -> Option<String> {
         let [x, _] = told_mm(&self.reader).filter(|_| self.pixel_from == PixelFrom::Given)?;
         let differs = (x / self.pixel_mm - 1.0).abs() > SAME;
         differs.then(|| {
@@ -168,7 +168,11 @@ impl Slice {
 ///
 /// # Errors
 /// As [`Slices::read`], or a mask has another size than `slice`.
-pub fn read_masks_at(z: usize, paths: &[PathBuf], slice: &Slice) -> Result<Mask, VolumeError> {
+pub(crate) fn read_masks_at(
+    z: usize,
+    paths: &[PathBuf],
+    slice: &Slice,
+) -> Result<Mask, VolumeError> {
     let mut united = Mask::new(slice.grey.width, slice.grey.height, false);
     for path in paths {
         let mask = Slices::open(path, slice.pixel_mm)?.read(z)?.grey.map(|v| v != 0.0);
@@ -195,7 +199,7 @@ pub fn read_masks(paths: &[PathBuf], slice: &Slice) -> Result<Mask, VolumeError>
 /// The masks in `candidates` that belong to `slice` by name: `STEM_mask-*.tif` (or `.tiff`, `.png`)
 /// for the slice `STEM.*`.
 #[must_use]
-pub fn masks_of(slice: &Path, candidates: &[PathBuf]) -> Vec<PathBuf> {
+pub(crate) fn masks_of(slice: &Path, candidates: &[PathBuf]) -> Vec<PathBuf> {
     let stem = slice.file_stem().and_then(OsStr::to_str).unwrap_or_default();
     let belongs = |p: &&PathBuf| {
         let name = p.file_stem().and_then(OsStr::to_str).unwrap_or_default();

@@ -14,3 +14,11 @@ pub mod zone;
 
 pub use error::EvidenceError;
 pub use evidence::{AddEvidence, AllEvidence, Cause, Evidence, EvidenceSource, Said, Sources};
+
+/// What a crate that brings evidence needs.
+pub mod prelude {
+    pub use crate::{
+        AddEvidence, Cause, Evidence, EvidenceError, EvidenceSource, Said,
+        zone::{ZONES, Zones, zone_at},
+    };
+}

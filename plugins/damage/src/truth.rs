@@ -23,7 +23,7 @@ struct Size {
 /// Damage of every zone by what was planted besides pores and cracks, whether a slice shows it or
 /// not: spalls, rust, lost stiffness.
 #[must_use]
-pub fn besides(member: &Member) -> [f64; ZONES] {
+pub(crate) fn besides(member: &Member) -> [f64; ZONES] {
     let size = Size::of(member);
     std::array::from_fn(|zone| together(member.truth.iter().map(|d| of_other(d, zone, size))))
 }

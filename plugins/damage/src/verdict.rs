@@ -193,7 +193,8 @@ impl Verdict {
 
     /// Whether one state is named that something measured stands behind.
     #[must_use]
-    pub fn is_settled(&self) -> bool {
+    #[cfg(test)]
+    pub(crate) fn is_settled(&self) -> bool {
         self.basis == Basis::Measured && self.run.is_some_and(|[best, worst]| best == worst)
     }
 }
@@ -266,7 +267,7 @@ fn run(likely: &[f64]) -> [usize; 2] {
 
 /// P(x ≥ from) of x normal about a reading and truncated to 0 ≤ x ≤ `most`.
 #[must_use]
-pub fn beyond(reading: Estimate, from: f64, most: f64) -> f64 {
+pub(crate) fn beyond(reading: Estimate, from: f64, most: f64) -> f64 {
     let Estimate { value, std_error } = reading;
     if from <= 0.0 {
         return 1.0;

@@ -22,7 +22,7 @@ use intrados_stage::{
 use serde::{Deserialize, Serialize};
 
 /// Schema of the JSON.
-pub const SCHEMA: &str = "intrados.experiment.calibration/2";
+pub(crate) const SCHEMA: &str = "intrados.experiment.calibration/2";
 
 /// By what odds damage is planted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -41,7 +41,7 @@ pub enum Odds {
 
 impl Odds {
     /// Both.
-    pub const ALL: [Self; 2] = [Self::Declared, Self::Clustered];
+    pub(crate) const ALL: [Self; 2] = [Self::Declared, Self::Clustered];
 }
 
 /// Coverage of the error bars over all plantings. Serialises to [`SCHEMA`].

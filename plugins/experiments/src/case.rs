@@ -7,7 +7,7 @@ use serde::Deserialize;
 use super::ExperimentError;
 
 /// The frozen table.
-pub const TABLE: &str = include_str!("cases.ron");
+pub(crate) const TABLE: &str = include_str!("cases.ron");
 /// Schema of the table.
 const SCHEMA: &str = "intrados.cases/1";
 
@@ -169,7 +169,7 @@ impl Cases {
 impl Case {
     /// Across the axis, m.
     #[must_use]
-    pub fn outline(&self) -> Outline {
+    pub(crate) fn outline(&self) -> Outline {
         match self.section {
             Section::Round(diameter) => Outline::Round(0.5e-3 * diameter),
             Section::Rectangle(width, height) => {
@@ -180,7 +180,7 @@ impl Case {
 
     /// All bars.
     #[must_use]
-    pub fn rods(&self) -> Vec<Rod> {
+    pub(crate) fn rods(&self) -> Vec<Rod> {
         let half = self.outline().half();
         self.bars
             .iter()

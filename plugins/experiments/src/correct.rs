@@ -98,7 +98,7 @@ fn lines(scan: &Scan) -> Sinogram {
 ///
 /// # Errors
 /// Cancelled.
-pub fn plain(scan: &Scan, job: &Job) -> Result<Slice, ExperimentError> {
+pub(crate) fn plain(scan: &Scan, job: &Job) -> Result<Slice, ExperimentError> {
     Ok(picture(
         fbp(&lines(scan), &scan.sheet.slice, Window::SheppLogan, job)?,
         &scan.sheet,
@@ -111,7 +111,11 @@ pub fn plain(scan: &Scan, job: &Job) -> Result<Slice, ExperimentError> {
 ///
 /// # Errors
 /// Cancelled.
-pub fn scattered(scan: &Scan, effort: Effort, job: &Job) -> Result<Scatter, ExperimentError> {
+pub(crate) fn scattered(
+    scan: &Scan,
+    effort: Effort,
+    job: &Job,
+) -> Result<Scatter, ExperimentError> {
     let sheet = &scan.sheet;
     let first = fbp(&lines(scan), &sheet.slice, Window::Hann, job)?;
     let (spectrum, response) = sheet.tube.radiation()?;
@@ -124,7 +128,7 @@ pub fn scattered(scan: &Scan, effort: Effort, job: &Job) -> Result<Scatter, Expe
 ///
 /// # Errors
 /// Cancelled.
-pub fn corrected(scan: &Scan, care: Care, job: &Job) -> Result<Slice, ExperimentError> {
+pub(crate) fn corrected(scan: &Scan, care: Care, job: &Job) -> Result<Slice, ExperimentError> {
     let scatter =
         if care.corrections.scatter { Some(scattered(scan, care.effort, job)?) } else { None };
     corrected_by(scan, care, scatter.as_ref(), job)

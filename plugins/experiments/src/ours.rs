@@ -55,7 +55,7 @@ impl Default for Choice {
 ///
 /// # Errors
 /// The job was cancelled.
-pub fn found(
+pub(crate) fn found(
     slice: &Slice,
     network: &Network,
     choice: &Choice,

@@ -43,7 +43,7 @@ pub fn otsu(slice: &Slice) -> Marks {
 /// Sauvola's threshold in a window of `window` pixels with the k and r of `settings`, connected
 /// components, the pores among them split by a watershed of the distance map.
 #[must_use]
-pub fn sauvola(slice: &Slice, settings: &DetectSettings) -> Marks {
+pub(crate) fn sauvola(slice: &Slice, settings: &DetectSettings) -> Marks {
     let otsu = otsu_threshold(&slice.grey);
     let body = body(&slice.grey, otsu);
     let matrix =
@@ -67,7 +67,7 @@ pub fn sauvola(slice: &Slice, settings: &DetectSettings) -> Marks {
 /// backprojection these did best on four of the twenty cases themselves (C02, C08, C09, B01, at a
 /// dose of 0.8): so much is allowed to nobody else.
 #[must_use]
-pub fn strongest() -> DetectSettings {
+pub(crate) fn strongest() -> DetectSettings {
     DetectSettings { window: 41, k: 0.8, split: Some(1.0), ..DetectSettings::default() }
 }
 

@@ -137,7 +137,7 @@ impl Sheet {
 
     /// From the source to the axis and to the panel, m.
     #[must_use]
-    pub fn distances(&self) -> [f64; 2] {
+    pub(crate) fn distances(&self) -> [f64; 2] {
         [SOURCE, SOURCE + BEHIND]
     }
 }
@@ -200,7 +200,7 @@ pub struct Cast {
 ///
 /// # Errors
 /// Cancelled, or the program's tables are damaged.
-pub fn make(case: &Case, cases: &Cases, job: &Job) -> Result<Made, ExperimentError> {
+pub(crate) fn make(case: &Case, cases: &Cases, job: &Job) -> Result<Made, ExperimentError> {
     cast(case, cases, job)?.exposed(case, job)
 }
 
@@ -208,7 +208,7 @@ pub fn make(case: &Case, cases: &Cases, job: &Job) -> Result<Made, ExperimentErr
 ///
 /// # Errors
 /// Cancelled, or the program's tables are damaged.
-pub fn cast(case: &Case, cases: &Cases, job: &Job) -> Result<Cast, ExperimentError> {
+pub(crate) fn cast(case: &Case, cases: &Cases, job: &Job) -> Result<Cast, ExperimentError> {
     let sheet = Sheet::of(case, cases);
     let edge = sheet.voxel() / FINE as f64;
     let [nx, ny, _] = sheet.slice.size;
@@ -242,7 +242,7 @@ impl Cast {
     ///
     /// # Errors
     /// Cancelled, or the program's tables are damaged.
-    pub fn exposed(self, case: &Case, job: &Job) -> Result<Made, ExperimentError> {
+    pub(crate) fn exposed(self, case: &Case, job: &Job) -> Result<Made, ExperimentError> {
         let Self { sheet, painted, truth, real, spectrum, response, rock, scatter } = self;
         job.relabel(format!("{}: exposing", case.id));
         let detector = Detector { blur: 0.35 * FINE as f64, ..Detector::default() };
@@ -406,7 +406,7 @@ pub(crate) fn standard(sheet: &Sheet) -> Result<Standard, ExperimentError> {
 ///
 /// # Errors
 /// The program's tables are damaged.
-pub fn energy(sheet: &Sheet) -> Result<f64, ExperimentError> {
+pub(crate) fn energy(sheet: &Sheet) -> Result<f64, ExperimentError> {
     Ok(standard(sheet)?.kev)
 }
 

@@ -99,7 +99,7 @@ impl Terms {
 
 /// Scores marks against the truth.
 #[must_use]
-pub fn scored(marks: &Marks, truth: &Truth, seed: u64) -> Scored {
+pub(crate) fn scored(marks: &Marks, truth: &Truth, seed: u64) -> Scored {
     let blocks = blocks(marks, truth);
     let (pores, cracks) = (truth.pores.data.contains(&true), truth.cracks.data.contains(&true));
     let sum = |blocks: &mut dyn Iterator<Item = &Counts>| {

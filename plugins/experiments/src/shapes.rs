@@ -122,7 +122,7 @@ pub struct Truth {
 impl Bodies {
     /// All of them within `high` above and below the scan plane, by the case's seed.
     #[must_use]
-    pub fn grow(case: &Case, high: f64) -> Self {
+    pub(crate) fn grow(case: &Case, high: f64) -> Self {
         let rods = case.rods();
         let grains = grains(case, high);
         let pores = case.pores.map_or_else(Vec::new, |p| pores(case, &p, &rods, high));
@@ -134,7 +134,7 @@ impl Bodies {
     ///
     /// # Errors
     /// [`Cancelled`] soon after the job was.
-    pub fn paint(
+    pub(crate) fn paint(
         &self,
         case: &Case,
         grid: &Grid,

@@ -18,7 +18,7 @@ use super::{
 use intrados_ct::{Picture, network::Network, slice::Slice};
 
 /// Schema of the JSON.
-pub const SCHEMA: &str = "intrados.experiment/1";
+pub(crate) const SCHEMA: &str = "intrados.experiment/1";
 
 /// One case by all methods, on the same projections.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -6,4 +6,5 @@ mod width;
 
 pub use course::GaugeCourse;
 pub use life::*;
-pub use width::{Tie, crack_width};
+pub use width::Tie;
+pub(crate) use width::crack_width;

@@ -22,7 +22,7 @@ use intrados_mechanics::{
     element::rod::Piece,
     material::{
         concrete::{Class, secant_modulus, tensile_strength},
-        durability::{Bars, Corrosion, Lost},
+        durability::{Bars, Corrosion, CorrosionError, Lost},
     },
     member::{Handed, Meshing, Part, Prepared, largest_element, prepare_within},
     model::{Failure, Gauge, History, MarchSettings, Point, SteelKind, Step, System},
@@ -113,14 +113,14 @@ pub struct Rust {
 }
 
 impl Rust {
-    fn not_computed(why: &str) -> Self {
-        Self { why_not: Some(why.to_owned()), ..Self::default() }
+    fn not_computed(why: &CorrosionError) -> Self {
+        Self { why_not: Some(why.to_string()), ..Self::default() }
     }
 
     fn of(corrosion: &Corrosion, bars: &[Vec<Bars>; ZONES], age: f64) -> Self {
         let Some(least) = bars.iter().flatten().copied().min_by(|a, b| a.cover.total_cmp(&b.cover))
         else {
-            return Self::not_computed("no bars are known of it");
+            return Self::not_computed(&CorrosionError::NoBars);
         };
         let years = corrosion.initiation(least.cover.max(0.0)) / YEAR;
         Self {
@@ -310,7 +310,7 @@ fn prepared(
 /// The bars of a model's members, and what attacks them.
 pub struct BarsOf {
     /// What may attack them, or why nobody knows.
-    pub corrosion: Result<Corrosion, String>,
+    pub corrosion: Result<Corrosion, CorrosionError>,
     /// Since the attack began, now, s.
     pub age: f64,
     /// By member.

@@ -27,7 +27,7 @@ pub struct Tie {
 /// the bar; bars farther apart than 5 (c + φ/2) have cracks between them as if there were none
 /// farther.
 #[must_use]
-pub fn crack_width(tie: &Tie) -> f64 {
+pub(crate) fn crack_width(tie: &Tie) -> f64 {
     let depth = 2.5 * (tie.cover + 0.5 * tie.diameter);
     let area = 0.25 * std::f64::consts::PI * tie.diameter.powi(2);
     let ratio = area / (depth * tie.spacing.clamp(tie.diameter, 2.0 * depth));

@@ -13,5 +13,5 @@ pub mod unknown;
 
 pub use heard::{can_simulate, member_of, reading_name, refusal};
 pub use readings::*;
-pub use simulate::{Simulation, simulate, simulate_with};
+pub use simulate::{Simulation, simulate_with};
 pub use unknown::Priors;

@@ -148,7 +148,7 @@ fn last_date(scene: &Scene) -> Option<Date> {
 /// # Errors
 /// Why it says nothing: too few readings, too short, before the member was there, or hardly any
 /// strain.
-pub fn drift(
+fn drift(
     series: &Series,
     course: &GaugeCourse,
     age_years: f64,

@@ -445,7 +445,7 @@ impl Rig {
 
     /// A reading as a datum of this rig; none where it has no such gauge or test.
     #[must_use]
-    pub fn datum(&self, reading: &Reading) -> Option<Datum> {
+    pub(crate) fn datum(&self, reading: &Reading) -> Option<Datum> {
         let gauge = self.gauges.iter().position(|g| g.0 == reading.of)?;
         let test = self.tests.iter().position(|t| Some(t) == reading.test.as_ref())?;
         Some(Datum {

@@ -168,15 +168,9 @@ impl<'r, 's, 'm> Reduced<'r, 's, 'm> {
         self.linear.solutions()
     }
 
-    /// Damages visited.
-    #[must_use]
-    pub fn visited(&self) -> usize {
-        self.visited
-    }
-
     /// Takes what a finer mesh reads of the sound member, and what its supports give: from now on
     /// every reading is corrected by the difference.
-    pub fn correct(&mut self, sound: &[f64], given: &[f64]) {
+    pub(crate) fn correct(&mut self, sound: &[f64], given: &[f64]) {
         let Some((own, _)) = self.read(&[], &[], &[]) else { return };
         self.finer += DVector::from_column_slice(sound) - own;
         // The basis is orthonormal in energy: at no damage fields are their forces in it.

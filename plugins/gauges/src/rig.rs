@@ -62,7 +62,7 @@ const FADE: f64 = 0.15;
 /// has 0.925 of its peak: damage fades over 0.15 of a tenth to either side of where the zone ends,
 /// and the shares of neighbours sum to 1.
 #[must_use]
-pub fn mean_share(group: &[usize], zone: usize) -> f64 {
+pub(crate) fn mean_share(group: &[usize], zone: usize) -> f64 {
     let beside = [zone.checked_sub(FACES), Some(zone + FACES).filter(|&z| z < TENTHS * FACES)];
     let own = if group.contains(&zone) { 1.0 } else { 0.0 };
     let lost = 0.25 * FADE;
@@ -75,7 +75,7 @@ pub fn mean_share(group: &[usize], zone: usize) -> f64 {
 }
 
 /// How far a border reaches to each side, in tenths of the axis.
-pub const BORDER: f64 = 0.125;
+pub(crate) const BORDER: f64 = 0.125;
 
 /// A member's own measures.
 #[derive(Debug, Clone, Copy)]

@@ -54,7 +54,7 @@ impl Default for Simulation {
 ///
 /// # Errors
 /// [`GaugeError`].
-pub fn simulate(
+pub(crate) fn simulate(
     scene: &Scene,
     member: usize,
     simulation: &Simulation,

@@ -16,7 +16,7 @@ const SAMPLES: u64 = 1_000_000;
 /// Runs the whole battery: names, and outcomes to be judged as one family (`Chi2::passes` with the
 /// length of the list).
 #[must_use]
-pub fn battery() -> Vec<(String, Chi2)> {
+pub(crate) fn battery() -> Vec<(String, Chi2)> {
     let mut checks = warps();
     checks.extend(materials().into_iter().flat_map(|(name, bsdf)| directions(&name, bsdf)));
     for (name, emitter) in lamps() {

@@ -131,7 +131,7 @@ impl Emitter {
 
     /// Total flux, W. Of lamps beyond the scene: what crosses the sphere around it.
     #[must_use]
-    pub fn flux(&self) -> Vec3 {
+    pub(crate) fn flux(&self) -> Vec3 {
         match self {
             Self::Triangle(t) => t.flux(),
             Self::Point { intensity, .. } => 2.0 * TAU * *intensity,
@@ -145,7 +145,7 @@ impl Emitter {
     /// back, outside the cone.
     #[inline]
     #[must_use]
-    pub fn toward(&self, x: Vec3, u: [f32; 2]) -> Option<Toward> {
+    pub(crate) fn toward(&self, x: Vec3, u: [f32; 2]) -> Option<Toward> {
         match self {
             Self::Triangle(t) => t.toward(x, u),
             Self::Point { position, intensity } => arriving(*position, x, |_| *intensity),
@@ -165,7 +165,7 @@ impl Emitter {
     /// is hit there; 0 for deltas.
     #[inline]
     #[must_use]
-    pub fn pdf_toward(&self, x: Vec3, direction: Vec3) -> f32 {
+    pub(crate) fn pdf_toward(&self, x: Vec3, direction: Vec3) -> f32 {
         match self {
             Self::Triangle(t) => t.pdf_toward(x, direction),
             Self::Environment(e) => e.pdf(direction),
@@ -176,7 +176,7 @@ impl Emitter {
     /// A ray from the lamp, from four uniform numbers.
     #[inline]
     #[must_use]
-    pub fn emit(&self, u: [f32; 4]) -> Emission {
+    pub(crate) fn emit(&self, u: [f32; 4]) -> Emission {
         let (a, b) = ([u[0], u[1]], [u[2], u[3]]);
         match self {
             Self::Triangle(t) => t.emit(a, b),
@@ -255,7 +255,7 @@ impl Triangle {
 
     /// Radiant flux, π L A.
     #[must_use]
-    pub fn flux(&self) -> Vec3 {
+    pub(crate) fn flux(&self) -> Vec3 {
         self.radiance * (PI * self.area)
     }
 
@@ -270,7 +270,7 @@ impl Triangle {
     /// See `Emitter::toward`: uniform by area, the density carried over by r²/cosθ′.
     #[inline]
     #[must_use]
-    pub fn toward(&self, x: Vec3, u: [f32; 2]) -> Option<Toward> {
+    pub(crate) fn toward(&self, x: Vec3, u: [f32; 2]) -> Option<Toward> {
         let to = self.point(u) - x;
         let squared = to.length_squared();
         let distance = squared.sqrt();
@@ -289,7 +289,7 @@ impl Triangle {
     /// See `Emitter::pdf_toward`.
     #[inline]
     #[must_use]
-    pub fn pdf_toward(&self, x: Vec3, direction: Vec3) -> f32 {
+    pub(crate) fn pdf_toward(&self, x: Vec3, direction: Vec3) -> f32 {
         let cos = -direction.dot(self.normal);
         let distance = (x - self.corner).dot(self.normal) / cos;
         if cos > 0.0 && distance > 0.0 { distance * distance / (cos * self.area) } else { 0.0 }
@@ -298,7 +298,7 @@ impl Triangle {
     /// See `Emitter::emit`.
     #[inline]
     #[must_use]
-    pub fn emit(&self, position: [f32; 2], direction: [f32; 2]) -> Emission {
+    pub(crate) fn emit(&self, position: [f32; 2], direction: [f32; 2]) -> Emission {
         let local = warp::cosine_hemisphere(direction);
         Emission {
             origin: self.point(position),
@@ -353,7 +353,7 @@ impl Spot {
 
     /// Total flux, W: 2π(∫ of the square over the fall + what is left to the axis).
     #[must_use]
-    pub fn flux(&self) -> Vec3 {
+    pub(crate) fn flux(&self) -> Vec3 {
         let whole = (1.0 - self.cos_outer).min(self.fall);
         self.peak
             * (TAU
@@ -363,7 +363,7 @@ impl Spot {
     /// Density, per sr, with which `emit` draws `direction`.
     #[inline]
     #[must_use]
-    pub fn pdf_direction(&self, direction: Vec3) -> f32 {
+    pub(crate) fn pdf_direction(&self, direction: Vec3) -> f32 {
         if direction.dot(self.frame.z) > self.cos_outer {
             warp::cone_pdf(self.cos_outer)
         } else {
@@ -374,7 +374,7 @@ impl Spot {
     /// A ray, uniform in the outer cone.
     #[inline]
     #[must_use]
-    pub fn emit(&self, u: [f32; 2]) -> Emission {
+    pub(crate) fn emit(&self, u: [f32; 2]) -> Emission {
         let direction = self.frame.to_world(warp::cone(u, self.cos_outer));
         at_point(
             self.position,
@@ -430,7 +430,7 @@ impl Environment {
 
     /// Flux through the sphere around the scene: ∫ L dω times its cross-section.
     #[must_use]
-    pub fn flux(&self) -> Vec3 {
+    pub(crate) fn flux(&self) -> Vec3 {
         let integral = self.image.as_ref().map_or(Vec3::splat(2.0 * TAU), |image| image.integral);
         self.radiance * integral * self.bounds.disk_area()
     }
@@ -438,7 +438,7 @@ impl Environment {
     /// Density of `toward`, per sr.
     #[inline]
     #[must_use]
-    pub fn pdf(&self, direction: Vec3) -> f32 {
+    pub(crate) fn pdf(&self, direction: Vec3) -> f32 {
         match &self.image {
             None => 0.5 / TAU,
             Some(image) => image.pdf(direction),
@@ -455,7 +455,7 @@ impl Environment {
     /// See `Emitter::toward`; the same from every point.
     #[inline]
     #[must_use]
-    pub fn toward(&self, u: [f32; 2]) -> Option<Toward> {
+    pub(crate) fn toward(&self, u: [f32; 2]) -> Option<Toward> {
         let (direction, pdf) = self.direction(u)?;
         Some(Toward {
             direction,
@@ -469,7 +469,7 @@ impl Environment {
     /// See `Emitter::emit`: a direction as in `toward`, an origin on the disk across it.
     #[inline]
     #[must_use]
-    pub fn emit(&self, position: [f32; 2], direction: [f32; 2]) -> Emission {
+    pub(crate) fn emit(&self, position: [f32; 2], direction: [f32; 2]) -> Emission {
         let (from, pdf_direction) = self.direction(direction).unwrap_or((Vec3::Y, 0.5 / TAU));
         Emission {
             origin: self.bounds.start(-from, position),

@@ -246,7 +246,7 @@ impl Film {
     /// one has only one. (The channels of a pixel are correlated: their errors are added as if
     /// fully so, which is exact for grey and never too small.)
     #[must_use]
-    pub fn stratified(&self) -> Option<(f64, Option<f64>)> {
+    pub(crate) fn stratified(&self) -> Option<(f64, Option<f64>)> {
         let weights = [0.2126, 0.7152, 0.0722];
         let (mut mean, mut variance) = (0.0, 0.0);
         for pixel in 0..self.len() {

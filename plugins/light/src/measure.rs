@@ -183,7 +183,7 @@ impl Measurement {
 
     /// Passes of each side in a round: a guide that knows which side is better gives it more.
     #[must_use]
-    pub fn turns(&self) -> [u32; 2] {
+    pub(crate) fn turns(&self) -> [u32; 2] {
         self.guide
             .as_ref()
             .filter(|_| !self.primal.is_empty() && self.dual.is_some())

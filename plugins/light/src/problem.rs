@@ -14,9 +14,7 @@ use glam::Vec3;
 use glam::Vec3A;
 use intrados_scene::{Hit, Ray, tracer::Scratch};
 use intrados_stage::random::Key;
-use intrados_transport::{
-    Ends, Links, Side, States, Steps, TransportProblem, dimension, keep, spread,
-};
+use intrados_transport::prelude::*;
 use wide::f32x8;
 
 use crate::{

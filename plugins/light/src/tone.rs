@@ -9,7 +9,7 @@ use crate::luminance;
 
 /// What a pixel that is not a number looks like: a magenta that neither curve nor map produces from
 /// numbers near it.
-pub const NOT_A_NUMBER: [u8; 3] = [255, 0, 255];
+pub(crate) const NOT_A_NUMBER: [u8; 3] = [255, 0, 255];
 
 /// How display luminance follows scene luminance.
 #[derive(Debug, Clone, Copy, PartialEq)]

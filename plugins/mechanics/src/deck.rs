@@ -19,6 +19,7 @@ use intrados_stage::Job;
 
 use crate::{
     element::{ElementError, embed::EmbedError, hex8::Kind, load},
+    material::durability::CorrosionError,
     member::{Part, Prepared},
     mesh::{ElementId, HexFace, Locator, Mesh},
     model::{
@@ -120,7 +121,7 @@ impl Case {
         let times = self.steps.iter().map(|s| s.1).collect();
         let reach = mesh.bounds().map_or(DVec3::ZERO, |[low, high]| high - low);
         let longest = DVec3::AXES[reach.max_position()];
-        let corrosion = Err("a deck says nothing of exposure".into());
+        let corrosion = Err(CorrosionError::Deck);
         Prepared {
             id: id.into(),
             model: self.model,

@@ -32,3 +32,15 @@ pub use analysis::{Outcome, analyze};
 pub use member::{MemberError, Meshing, Prepared, prepare};
 pub use model::System;
 pub use plugin::MechanicsPlugin;
+
+/// What a model takes that no scene describes: a mesh, its matter, and a march through its loads.
+pub mod prelude {
+    pub use crate::{
+        material::{concrete::Given, law::Setting},
+        mesh::{Mesh, block, divide},
+        model::{
+            Action, Body, Control, Drive, Elastic, Failure, Linear, Load, March, MarchSettings,
+            Matter, Model, System,
+        },
+    };
+}

@@ -145,12 +145,7 @@ const CRUSHED: f64 = 0.3;
 /// How equilibria are found while loads are raised, from how they are found in a life: many cracks
 /// grow in every step, and the last per mille costs most.
 pub(crate) fn settings(of_life: MarchSettings) -> MarchSettings {
-    MarchSettings {
-        tolerance: of_life.tolerance.max(5e-3),
-        loose: 4.0,
-        iterations: 40,
-        ..of_life
-    }
+    MarchSettings { tolerance: of_life.tolerance.max(5e-3), loose: 4.0, iterations: 40, ..of_life }
 }
 
 /// What is watched on the way.
@@ -439,23 +434,21 @@ impl<'a, 'm> Watch<'a, 'm> {
     /// By what it fails, from what happened where.
     fn mode(&self, has_failed: bool, job: &Job) -> Result<(Mode, String), Failure> {
         let peak = self.curve[self.peak];
-        let at = |p: &CurvePoint| format!("{:.0} kN, {:.1} mm", 1e-3 * p.load_n, 1e3 * p.displacement_m);
+        let at =
+            |p: &CurvePoint| format!("{:.0} kN, {:.1} mm", 1e-3 * p.load_n, 1e3 * p.displacement_m);
         if let Some((mode, name)) = &self.broken {
             return Ok((*mode, format!("{name} breaks")));
         }
-        let yielded = self.yielding.as_ref().filter(|(y, _)| {
-            y.displacement_m <= peak.displacement_m
-        });
-        let after = yielded.map_or(String::new(), |(y, name)| {
-            format!("; {name} yields at {}", at(y))
-        });
+        let yielded =
+            self.yielding.as_ref().filter(|(y, _)| y.displacement_m <= peak.displacement_m);
+        let after =
+            yielded.map_or(String::new(), |(y, name)| format!("; {name} yields at {}", at(y)));
         let opened = self.opened();
         let crushed = self.crushed();
         let oblique = opened[1] > 0.5 * opened.iter().sum::<f64>() && opened[1] > 0.0;
         // A fall that a diagonal crack brings is one even after bars have yielded.
         if has_failed && oblique {
-            let mode =
-                if crushed > 0.0 { Mode::ShearCompression } else { Mode::DiagonalTension };
+            let mode = if crushed > 0.0 { Mode::ShearCompression } else { Mode::DiagonalTension };
             let crushes = if crushed > 0.0 { ", and concrete is crushed" } else { "" };
             return Ok((
                 mode,
@@ -485,7 +478,10 @@ impl<'a, 'm> Watch<'a, 'm> {
         if crushed > 0.0 {
             return Ok((
                 Mode::Crushing,
-                format!("{:.1} % of its concrete is crushed, no bar yields in tension", 100.0 * crushed),
+                format!(
+                    "{:.1} % of its concrete is crushed, no bar yields in tension",
+                    100.0 * crushed
+                ),
             ));
         }
         if has_failed && self.slipped() {

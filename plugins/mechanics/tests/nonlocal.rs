@@ -2,14 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use glam::DVec3;
-use intrados_mechanics::{
-    material::{concrete::Given, law::Setting},
-    mesh::{Mesh, block, divide},
-    model::{
-        Action, Body, Drive, Failure, Load, March, MarchSettings, Matter, Model, Regularisation,
-        System,
-    },
-};
+use intrados_mechanics::{model::Regularisation, prelude::*};
 use intrados_stage::Job;
 
 const LENGTH: f64 = 0.24;

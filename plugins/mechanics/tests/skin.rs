@@ -4,10 +4,9 @@
 use glam::{DVec3, Vec3};
 use intrados_mechanics::{
     analysis::analyze,
-    material::{concrete::Given, law::Setting},
+    material::durability::CorrosionError,
     member::{Part, Prepared},
-    mesh::{block, divide},
-    model::{Action, Body, Load, MarchSettings, Matter, Model, System},
+    prelude::*,
     skin::{Looking, Seen, Skin},
 };
 use intrados_scene::MemberKind;
@@ -86,7 +85,7 @@ fn beam() -> Prepared {
         direction: DVec3::X,
         raised: None,
         gauges: vec![],
-        corrosion: Err(String::new()),
+        corrosion: Err(CorrosionError::NoBars),
         attacked: 0.0,
         warnings: vec![],
         notes: vec![],

@@ -9,11 +9,9 @@ use intrados_mechanics::{
     element::embed::embed,
     material::{bond::Bond, steel::Bar},
     member::{Meshing, prepare},
-    mesh::{Locator, block, divide},
-    model::{
-        Action, Body, Drive, Elastic, Load, March, MarchSettings, Matter, Model, Slipping, Steel,
-        SteelKind, System,
-    },
+    mesh::Locator,
+    model::{Slipping, Steel, SteelKind},
+    prelude::*,
 };
 use intrados_scene::Scene;
 use intrados_stage::Job;

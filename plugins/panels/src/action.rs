@@ -80,7 +80,7 @@ impl Actions {
 
     /// Whether `action` waits.
     #[must_use]
-    pub fn has(&self, action: &Action) -> bool {
+    pub(crate) fn has(&self, action: &Action) -> bool {
         self.0.contains(action)
     }
 

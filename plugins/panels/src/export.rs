@@ -1,6 +1,10 @@
 //! The picture as a file.
 
-use std::path::{Path, PathBuf};
+use std::{
+    error::Error,
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
 use bevy_ecs::prelude::*;
 use egui::{ColorImage, Ui};
@@ -17,9 +21,12 @@ use crate::{
     picture,
 };
 
+/// Writes a film to a file, or says why it cannot.
+type Write = dyn Fn(&Render, &Path) -> Result<(), Box<dyn Error + Send + Sync>> + Send + Sync;
+
 /// Writes a film with all its data (EXR); put there by who knows the format. Runs off the frame.
 #[derive(Resource, Clone)]
-pub struct Exporter(pub std::sync::Arc<dyn Fn(&Render, &Path) -> Result<(), String> + Send + Sync>);
+pub struct Exporter(pub Arc<Write>);
 
 /// The sheet that asks for a file name, and the write that runs.
 #[derive(Resource, Default)]
@@ -110,7 +117,8 @@ fn save(
         Some(exporter) => {
             let render = render.clone();
             Task::spawn(jobs, label, move |_| {
-                (exporter.0)(&render, &path).map(|()| path.display().to_string())
+                let written = (exporter.0)(&render, &path);
+                written.map(|()| path.display().to_string()).map_err(|e| e.to_string())
             })
         }
         None => {

@@ -40,7 +40,7 @@ impl Latest {
 
     /// Whether all is done.
     #[must_use]
-    pub fn is_done(&self) -> bool {
+    pub(crate) fn is_done(&self) -> bool {
         self.pieces.0 >= self.pieces.1
     }
 }

@@ -63,7 +63,7 @@ impl Now {
 
     /// Which side the combination is made of.
     #[must_use]
-    pub fn mixture(&self) -> String {
+    pub(crate) fn mixture(&self) -> String {
         match (self.primal, self.dual) {
             (Some(_), Some(_)) if self.share >= 1.0 => {
                 "primal alone: the dual would make it worse".into()
@@ -102,7 +102,7 @@ impl Now {
 
 /// One point of the convergence plot.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Entry {
+pub(crate) struct Entry {
     /// CPU-seconds.
     pub cpu_seconds: f64,
     /// Relative standard errors: primal, dual, combined.
@@ -120,14 +120,14 @@ impl Statistics {
 
     /// How it came to that.
     #[must_use]
-    pub fn history(&self) -> &[Entry] {
+    pub(crate) fn history(&self) -> &[Entry] {
         &self.history
     }
 
     /// Figure of merit that the mean of an unsteered picture through `camera` had when it was left,
     /// 1/(relVar · CPU-seconds).
     #[must_use]
-    pub fn unsteered(&self, camera: &Camera) -> Option<f64> {
+    pub(crate) fn unsteered(&self, camera: &Camera) -> Option<f64> {
         self.unsteered.as_ref().filter(|(of, _)| of == camera).map(|(_, merit)| *merit)
     }
 

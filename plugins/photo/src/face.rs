@@ -51,7 +51,7 @@ impl Face {
     /// A place across on this part of the face: of what goes around, as many turns further as bring
     /// it nearest to the part's middle.
     #[must_use]
-    pub fn turned(&self, across: f64) -> f64 {
+    pub(crate) fn turned(&self, across: f64) -> f64 {
         let Some(half) = self.half_turn() else { return across };
         let low = 0.5 * (self.across[0] + self.across[1]) - half;
         low + (across - low).rem_euclid(2.0 * half)
@@ -115,7 +115,7 @@ impl Surface {
 
     /// Place on the axis, 0 to 1, and angle about it, degrees, 0 to 360.
     #[must_use]
-    pub fn coordinates(&self, place: DVec3) -> (f64, f64) {
+    pub(crate) fn coordinates(&self, place: DVec3) -> (f64, f64) {
         let p = place - self.start;
         let angle = p.dot(self.ninety).atan2(p.dot(self.zero)).to_degrees().rem_euclid(360.0);
         (p.dot(self.axis) / self.length, angle)
@@ -131,7 +131,7 @@ impl Surface {
 
     /// The face that a place belongs to; `None` of the member's ends.
     #[must_use]
-    pub fn face_of(&self, place: DVec3, normal: DVec3) -> Option<usize> {
+    pub(crate) fn face_of(&self, place: DVec3, normal: DVec3) -> Option<usize> {
         let is_own = |face: &Face| match face.chart {
             Chart::Flat(n) => n.dot(normal) > OWN,
             Chart::Around(_) => normal.dot(self.radial(place)) > 0.0 && self.is_side(normal),

@@ -19,7 +19,7 @@ use serde::Serialize;
 use crate::{Defect, SliceReading};
 
 /// Schema of the JSON.
-pub const SCHEMA: &str = "intrados.predict/2";
+pub(crate) const SCHEMA: &str = "intrados.predict/2";
 
 /// The prediction for a scene. Serialises to `intrados.predict/2`.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -72,7 +72,7 @@ impl Basis {
 
     /// Length of the member of that id, m; 1 where it is of none.
     #[must_use]
-    pub fn length_of(&self, id: &str) -> f64 {
+    pub(crate) fn length_of(&self, id: &str) -> f64 {
         self.members.iter().find(|b| b.id == id).map_or(1.0, |b| b.length_m)
     }
 }

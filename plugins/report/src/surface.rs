@@ -125,7 +125,7 @@ pub fn foretold(damage: Option<f64>) -> Vec3 {
 
 /// How a zone looks: its damage's colour, paler where nobody has measured it.
 #[must_use]
-pub fn look(prediction: &Prediction, member: usize, zone: usize) -> Vec3 {
+pub(crate) fn look(prediction: &Prediction, member: usize, zone: usize) -> Vec3 {
     let Some(m) = prediction.members.get(member) else { return UNKNOWN };
     let damage = m.zones.0[zone].map(|r| r.value);
     if m.zone_basis[zone] == Basis::Foretold { foretold(damage) } else { colour(damage) }
@@ -134,7 +134,7 @@ pub fn look(prediction: &Prediction, member: usize, zone: usize) -> Vec3 {
 /// The scene with its members coloured by damage, of whose surfaces `facets` are; everything else
 /// stays.
 #[must_use]
-pub fn coloured(scene: &Scene, facets: &[Facet], prediction: &Prediction) -> Model {
+pub(crate) fn coloured(scene: &Scene, facets: &[Facet], prediction: &Prediction) -> Model {
     let mut model = Model::from(scene);
     model.objects.retain(|o| o.member.is_none() || o.part != Part::Concrete);
     let white = model.materials.len();

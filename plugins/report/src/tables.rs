@@ -13,7 +13,7 @@ use intrados_stage::csv::{Table, number};
 
 /// One row a member.
 #[must_use]
-pub fn members_csv(prediction: &Prediction) -> String {
+pub(crate) fn members_csv(prediction: &Prediction) -> String {
     let mut table = Table::new(&[
         "member_id",
         "name",
@@ -86,7 +86,7 @@ fn rust(m: &MemberPrediction) -> &'static str {
 
 /// One row a zone that anything is known of: fused, and by source.
 #[must_use]
-pub fn zones_csv(prediction: &Prediction) -> String {
+pub(crate) fn zones_csv(prediction: &Prediction) -> String {
     let mut table = Table::new(&[
         "member_id",
         "from [1]",
@@ -133,7 +133,7 @@ pub fn zones_csv(prediction: &Prediction) -> String {
 
 /// One row a slice.
 #[must_use]
-pub fn slices_csv(prediction: &Prediction) -> String {
+pub(crate) fn slices_csv(prediction: &Prediction) -> String {
     let mut table = Table::new(&[
         "member_id",
         "core",
@@ -216,7 +216,7 @@ pub fn evidence_csv(prediction: &Prediction) -> String {
 
 /// One row a defect.
 #[must_use]
-pub fn defects_csv(prediction: &Prediction) -> String {
+pub(crate) fn defects_csv(prediction: &Prediction) -> String {
     let mut table = Table::new(&[
         "member_id",
         "member",

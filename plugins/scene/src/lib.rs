@@ -37,3 +37,11 @@ pub use sensor::{Camera, Meter};
 pub use structure::{Assembly, SteelLine, Structure};
 pub use summary::Summary;
 pub use tracer::{Hit, Ray, Tracer};
+
+/// What a plugin needs that works on the scene which is open.
+pub mod prelude {
+    pub use crate::{
+        Camera, Member, Meter, Scene,
+        plugin::{CurrentScene, FromScene, OpenScene, SceneChanged, SceneFailed, SceneIndex},
+    };
+}

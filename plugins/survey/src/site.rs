@@ -61,7 +61,8 @@ impl Site {
 
     pub(crate) fn take(&mut self, known: BarsOf, id: &str) {
         let BarsOf { corrosion, age, parts } = known;
-        (self.corrosion, self.age) = (corrosion, age);
+        self.corrosion = corrosion.map_err(|why| why.to_string());
+        self.age = age;
         if let Some(part) = parts.into_iter().find(|part| part.id == id) {
             (self.bars, self.outer) = (part.bars, part.outer);
         }

@@ -88,7 +88,7 @@ impl Exact {
 
     /// The sum as a number and what is left beside it: some hundred bits.
     #[must_use]
-    pub fn double(&self) -> [f64; 2] {
+    pub(crate) fn double(&self) -> [f64; 2] {
         let high = self.value();
         if !high.is_finite() {
             return [high, 0.0];

@@ -89,7 +89,7 @@ impl FieldEvidence {
 
     /// How many equally large numbers they amount to: (Σv)²/Σv².
     #[must_use]
-    pub fn effective(&self) -> f64 {
+    pub(crate) fn effective(&self) -> f64 {
         if self.squares > 0.0 { self.sum * self.sum / self.squares } else { 0.0 }
     }
 

@@ -36,3 +36,10 @@ pub use walk::{
     BATCH, Estimator, Nobody, Roulette, Tally, WalkObserver, WalkRule, Workspace, measure, run,
     run_watched,
 };
+
+/// What another physics implements, and what it is implemented with.
+pub mod prelude {
+    pub use crate::{
+        Ends, Links, Perturbed, Side, States, Steps, TransportProblem, dimension, keep, spread,
+    };
+}

@@ -182,7 +182,7 @@ pub struct Steps<V: Value> {
 
 impl<V: Value> Ends<V> {
     /// `n` empty rows.
-    pub fn reset(&mut self, n: usize) {
+    pub(crate) fn reset(&mut self, n: usize) {
         refill(&mut self.value, n);
         self.bin.resize(n, 0);
         self.kernel_density.resize(n, <V::Real as crate::Real>::ZERO);
@@ -192,7 +192,7 @@ impl<V: Value> Ends<V> {
 
 impl<V: Value> Links<V> {
     /// `n` empty rows.
-    pub fn reset(&mut self, n: usize) {
+    pub(crate) fn reset(&mut self, n: usize) {
         refill(&mut self.value, n);
         self.bin.resize(n, 0);
         self.link_density.resize(n, <V::Real as crate::Real>::ZERO);
@@ -202,7 +202,7 @@ impl<V: Value> Links<V> {
 
 impl<V: Value> Steps<V> {
     /// `n` rows that end here.
-    pub fn reset(&mut self, n: usize) {
+    pub(crate) fn reset(&mut self, n: usize) {
         refill(&mut self.factor, n);
         refill(&mut self.survival, n);
     }

@@ -215,12 +215,6 @@ impl Scores {
         self.halves.each_ref().map(Sums::moments)
     }
 
-    /// Scores that were not finite.
-    #[must_use]
-    pub fn invalid(&self) -> u64 {
-        self.invalid
-    }
-
     /// Whether the error bar may be trusted.
     #[must_use]
     pub fn converged(&self) -> Converged {
@@ -241,7 +235,7 @@ impl Scores {
     /// (at least 20): below 2 the variance does not exist, near 2 its estimate lies. Infinite where
     /// the largest scores are all alike.
     #[must_use]
-    pub fn tail_index(&self) -> f64 {
+    pub(crate) fn tail_index(&self) -> f64 {
         let positive: u64 = self.sizes.iter().sum();
         let wanted = (self.walks() / 100).max(20).min(positive);
         if wanted < 2 {
@@ -346,12 +340,6 @@ impl WalkEstimate {
     #[must_use]
     pub fn rel_var_per_walk(&self) -> f64 {
         self.walks as f64 * self.rel_error().powi(2)
-    }
-
-    /// 95 % interval.
-    #[must_use]
-    pub fn interval(&self) -> [f64; 2] {
-        [self.mean - 1.96 * self.std_error, self.mean + 1.96 * self.std_error]
     }
 }
 

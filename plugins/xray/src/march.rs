@@ -35,7 +35,7 @@ impl Lattice {
     /// Index of the cell at `p`, x fastest; None outside.
     #[inline]
     #[must_use]
-    pub fn cell(&self, p: DVec3) -> Option<usize> {
+    pub(crate) fn cell(&self, p: DVec3) -> Option<usize> {
         let at = (p - self.origin) / self.spacing;
         let inside = at.cmpge(DVec3::ZERO).all() && at.cmplt(self.cells.as_dvec3()).all();
         inside.then(|| self.index(at.as_uvec3()))
@@ -56,7 +56,7 @@ impl Lattice {
 
     /// Lowest corner of cell `index`, m.
     #[must_use]
-    pub fn corner(&self, index: usize) -> DVec3 {
+    pub(crate) fn corner(&self, index: usize) -> DVec3 {
         let (x, y) = (self.cells.x as usize, self.cells.y as usize);
         let c = UVec3::new((index % x) as u32, (index / x % y) as u32, (index / (x * y)) as u32);
         self.origin + self.spacing * c.as_dvec3()
@@ -65,7 +65,7 @@ impl Lattice {
     /// Calls `visit(cell, from, to)` for every cell that the way from `origin` along the unit
     /// vector `way` passes between distances `from` and `to`, in order, until it says false.
     #[inline]
-    pub fn march(
+    pub(crate) fn march(
         &self,
         origin: DVec3,
         way: DVec3,

@@ -16,9 +16,7 @@ use std::{f64::consts::TAU, ops::Range};
 
 use glam::DVec3;
 use intrados_stage::random::{Draw, Key};
-use intrados_transport::{
-    Ends, Links, Side, States, Steps, TransportProblem, dimension, keep, spread,
-};
+use intrados_transport::prelude::*;
 
 use crate::{
     physics::{Backward, CUT, Cross, Forward, Matter, energy_before, klein_nishina_total, ratio},

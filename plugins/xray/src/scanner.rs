@@ -86,7 +86,7 @@ impl Panel {
 
     /// The pixel that a way from `origin` meets from in front, and the cosine.
     #[must_use]
-    pub fn met(&self, origin: DVec3, way: DVec3) -> Option<(u32, f64)> {
+    pub(crate) fn met(&self, origin: DVec3, way: DVec3) -> Option<(u32, f64)> {
         let cos = way.dot(self.normal());
         let s = (self.centre - origin).dot(self.normal()) / cos;
         if !(cos > 0.0 && s > 0.0) {
@@ -202,7 +202,7 @@ impl Scanner {
 
     /// A direction, even over the slopes, and the emission over its density.
     #[must_use]
-    pub fn emit(&self, [a, b]: [f64; 2]) -> (DVec3, f64) {
+    pub(crate) fn emit(&self, [a, b]: [f64; 2]) -> (DVec3, f64) {
         let Beam { u, v, flat } = self.beam;
         let (a, b) = (u[0] + a * (u[1] - u[0]), v[0] + b * (v[1] - v[0]));
         let length = (1.0 + a * a + b * b).sqrt();

@@ -178,7 +178,7 @@ impl Specimen {
     /// Material of a label.
     #[inline]
     #[must_use]
-    pub fn matter(&self, label: u8) -> &Matter {
+    pub(crate) fn matter(&self, label: u8) -> &Matter {
         &self.materials[self.palette[label as usize].material]
     }
 
@@ -224,7 +224,7 @@ impl Specimen {
     /// the unit vector `way` passes between distances `from` and `to`, in order, until it says
     /// false. Pieces of nothing may be left out.
     #[inline]
-    pub fn trace(
+    pub(crate) fn trace(
         &self,
         origin: DVec3,
         way: DVec3,
@@ -289,7 +289,7 @@ impl Specimen {
     /// None if it leaves. Voxels by Woodcock's (1965) tracking with a majorant for every 8³ of
     /// them, solids in closed form.
     #[must_use]
-    pub fn fly(
+    pub(crate) fn fly(
         &self,
         local: &Local,
         origin: DVec3,
@@ -412,7 +412,7 @@ impl Shape {
     /// Where a way is inside, from distance 0 on.
     #[inline]
     #[must_use]
-    pub fn crossed(&self, origin: DVec3, way: DVec3) -> Option<[f64; 2]> {
+    pub(crate) fn crossed(&self, origin: DVec3, way: DVec3) -> Option<[f64; 2]> {
         match *self {
             Self::Box(corners) => slab(corners, origin, way),
             Self::Cylinder { base, top, radius } => {

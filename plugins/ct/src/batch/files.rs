@@ -157,7 +157,7 @@ pub fn pores_csv<'a>(slices: impl Iterator<Item = ([&'a str; 3], &'a [Pore])>) -
 
 /// One row a crack. `slices`: what each is called, and the cracks in it.
 #[must_use]
-pub fn cracks_csv<'a>(slices: impl Iterator<Item = (&'a str, &'a [Crack])>) -> String {
+pub(crate) fn cracks_csv<'a>(slices: impl Iterator<Item = (&'a str, &'a [Crack])>) -> String {
     let mut table = Table::new(&[
         "slice",
         "crack",

@@ -11,7 +11,7 @@ use intrados_stage::{Cancelled, Job, file::WriteError};
 use intrados_xray::volume::VolumeError;
 use serde::{Deserialize, Serialize};
 
-pub use files::{DetectionWriter, cracks_csv, pores_csv};
+pub use files::{DetectionWriter, pores_csv};
 
 use crate::{
     SliceError,

@@ -31,7 +31,7 @@ pub enum Class {
 }
 
 /// Number of classes.
-pub const CLASSES: usize = 4;
+pub(crate) const CLASSES: usize = 4;
 /// Planes that the network sees.
 const CT: usize = 2;
 /// Sides must be divisible by this: two levels below the first.
@@ -96,7 +96,7 @@ impl Network {
 
     /// Reads little-endian floats; how many there are tells the size of the network.
     #[must_use]
-    pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
+    pub(crate) fn from_bytes(bytes: &[u8]) -> Option<Self> {
         let base =
             (1..=16).map(|n| n * BLOCK).find(|&base| 4 * Self::count(base) == bytes.len())?;
         Unet::from_bytes(shape(base), bytes).map(Self)

@@ -22,7 +22,7 @@ use crate::{crack::Crack, slice::Slice};
 pub const MARK: &str = "drawn, not scanned";
 
 /// Side of a drawn slice, pixels.
-pub const SIDES: std::ops::RangeInclusive<u32> = 32..=4096;
+pub(crate) const SIDES: std::ops::RangeInclusive<u32> = 32..=4096;
 
 /// Most drawn slices of one core.
 pub(crate) const MOST_SLICES: u32 = 1000;
@@ -211,7 +211,7 @@ pub struct Design {
 
 /// The whole designed section of member `index` where a slice lies; `None` if it does not fit into
 /// a picture of that size, which then shows a core, or if there is no such member.
-pub fn designed(scene: &Scene, index: usize, request: Request) -> Option<Design> {
+pub(crate) fn designed(scene: &Scene, index: usize, request: Request) -> Option<Design> {
     let mut section = Section::of(scene, index, scene.members.get(index)?, request);
     if !section.centred() {
         return None;

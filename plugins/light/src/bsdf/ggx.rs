@@ -11,7 +11,7 @@ use glam::Vec3;
 use super::warp::at_height;
 
 /// Rougher than this or smooth: below, f32 cannot hold the lobe.
-pub const MIN_ALPHA: f32 = 1e-3;
+pub(crate) const MIN_ALPHA: f32 = 1e-3;
 
 /// D(h), per sr. Written with x² + y² instead of 1 − z², which would lose all digits in a sharp
 /// lobe.

@@ -22,7 +22,7 @@ use glam::Vec3;
 use intrados_scene::{Material, Surface};
 use intrados_transport::Side;
 
-pub use ggx::MIN_ALPHA;
+pub(crate) use ggx::MIN_ALPHA;
 pub use warp::Frame;
 
 /// Reflectance at normal incidence of what is no metal, as in glTF: an index of refraction of 1.5.
@@ -119,25 +119,14 @@ impl Bsdf {
     /// useless.
     #[inline]
     #[must_use]
-    pub fn is_delta(&self) -> bool {
+    pub(crate) fn is_delta(&self) -> bool {
         matches!(self, Self::SmoothDielectric { .. })
-    }
-
-    /// f·|cosθ_i|, deltas apart.
-    #[inline]
-    #[must_use]
-    pub fn eval(&self, wo: Vec3, wi: Vec3, side: Side) -> Vec3 {
-        match *self {
-            Self::Lambert { albedo } => albedo * lambert_pdf(wo, wi),
-            Self::Black | Self::SmoothDielectric { .. } => Vec3::ZERO,
-            _ => self.eval_pdf(wo, wi, side).0,
-        }
     }
 
     /// Density of `sample`, per sr, deltas apart.
     #[inline]
     #[must_use]
-    pub fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
+    pub(crate) fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
         match self {
             Self::Lambert { .. } => lambert_pdf(wo, wi),
             Self::Black | Self::SmoothDielectric { .. } => 0.0,
@@ -145,10 +134,10 @@ impl Bsdf {
         }
     }
 
-    /// `eval` and `pdf` at once: cheaper than one after the other.
+    /// f·|cosθ_i| and the density of `sample` (per sr), deltas apart.
     #[inline]
     #[must_use]
-    pub fn eval_pdf(&self, wo: Vec3, wi: Vec3, side: Side) -> (Vec3, f32) {
+    pub(crate) fn eval_pdf(&self, wo: Vec3, wi: Vec3, side: Side) -> (Vec3, f32) {
         match *self {
             Self::Lambert { albedo } => {
                 let pdf = lambert_pdf(wo, wi);
@@ -219,7 +208,7 @@ fn lambert_pdf(wo: Vec3, wi: Vec3) -> f32 {
 /// normals disagree about their sides.
 #[inline]
 #[must_use]
-pub fn shading_correction(wo: Vec3, wi: Vec3, shading: Vec3, geometric: Vec3) -> f32 {
+pub(crate) fn shading_correction(wo: Vec3, wi: Vec3, shading: Vec3, geometric: Vec3) -> f32 {
     let (os, og, is, ig) = (wo.dot(shading), wo.dot(geometric), wi.dot(shading), wi.dot(geometric));
     if os * og > 0.0 && is * ig > 0.0 { (os * ig / (og * is)).abs() } else { 0.0 }
 }
@@ -228,7 +217,7 @@ pub fn shading_correction(wo: Vec3, wi: Vec3, shading: Vec3, geometric: Vec3) ->
 /// beyond over the index here. Total reflection: 1 and 0.
 #[inline]
 #[must_use]
-pub fn fresnel(cos: f32, eta: f32) -> (f32, f32) {
+pub(crate) fn fresnel(cos: f32, eta: f32) -> (f32, f32) {
     let sin2 = (1.0 - cos * cos) / (eta * eta);
     if sin2 >= 1.0 {
         return (1.0, 0.0);

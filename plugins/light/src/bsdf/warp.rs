@@ -45,7 +45,7 @@ impl Frame {
     /// Local → world.
     #[inline]
     #[must_use]
-    pub fn to_world(&self, v: Vec3) -> Vec3 {
+    pub(crate) fn to_world(self, v: Vec3) -> Vec3 {
         self.x * v.x + self.y * v.y + self.z * v.z
     }
 }
@@ -66,7 +66,7 @@ fn sin_cos_octant(x: f32) -> (f32, f32) {
 /// neighbours together.
 #[inline]
 #[must_use]
-pub fn disk(u: [f32; 2]) -> Vec2 {
+pub(crate) fn disk(u: [f32; 2]) -> Vec2 {
     let (a, b) = (2.0 * u[0] - 1.0, 2.0 * u[1] - 1.0);
     let across = a.abs() > b.abs();
     let (r, t) = if across { (a, b) } else { (b, a) };
@@ -77,7 +77,7 @@ pub fn disk(u: [f32; 2]) -> Vec2 {
 /// Cosine-weighted on the upper hemisphere, density cosθ/π (Malley): z is never negative.
 #[inline]
 #[must_use]
-pub fn cosine_hemisphere(u: [f32; 2]) -> Vec3 {
+pub(crate) fn cosine_hemisphere(u: [f32; 2]) -> Vec3 {
     let d = disk(u);
     d.extend((1.0 - d.length_squared()).max(0.0).sqrt())
 }
@@ -100,21 +100,21 @@ pub(crate) fn at_height(z: f32, u: f32) -> Vec3 {
 /// Uniform on the unit sphere, density 1/4π.
 #[inline]
 #[must_use]
-pub fn sphere(u: [f32; 2]) -> Vec3 {
+pub(crate) fn sphere(u: [f32; 2]) -> Vec3 {
     at_height(1.0 - 2.0 * u[0], u[1])
 }
 
 /// Uniform in the cone around z whose half angle has cosine `cos_max`; density `cone_pdf`.
 #[inline]
 #[must_use]
-pub fn cone(u: [f32; 2], cos_max: f32) -> Vec3 {
+pub(crate) fn cone(u: [f32; 2], cos_max: f32) -> Vec3 {
     at_height(1.0 - u[0] * (1.0 - cos_max), u[1])
 }
 
 /// Density of `cone`, per sr.
 #[inline]
 #[must_use]
-pub fn cone_pdf(cos_max: f32) -> f32 {
+pub(crate) fn cone_pdf(cos_max: f32) -> f32 {
     1.0 / (2.0 * PI * (1.0 - cos_max))
 }
 

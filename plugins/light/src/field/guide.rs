@@ -133,7 +133,7 @@ impl Guide {
 
     /// Passes of each side in a round of both: the better side gets more.
     #[must_use]
-    pub fn turns(&self) -> [u32; 2] {
+    pub(crate) fn turns(&self) -> [u32; 2] {
         self.course.turns
     }
 

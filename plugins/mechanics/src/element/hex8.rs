@@ -19,7 +19,7 @@ use glam::{DMat3, DVec3};
 use nalgebra::{SMatrix, SVector};
 
 /// Natural coordinates of the nodes.
-pub const CORNERS: [DVec3; 8] = [
+pub(crate) const CORNERS: [DVec3; 8] = [
     DVec3::new(-1.0, -1.0, -1.0),
     DVec3::new(1.0, -1.0, -1.0),
     DVec3::new(1.0, 1.0, -1.0),
@@ -70,13 +70,14 @@ pub enum Kind {
 /// The nine internal unknowns of an element with incompatible modes: α of (1 − ξ²), (1 − η²), (1 −
 /// ζ²), each x, y, z (m).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Modes(pub [f64; 9]);
+pub(crate) struct Modes(pub [f64; 9]);
 
 impl Modes {
     /// Moves the modes with a change of the nodes' displacements, as the element that was
     /// integrated before foresees it: exact for linear laws, and the classical one-step update of a
     /// global Newton iteration otherwise.
-    pub fn advance(&mut self, solid: &Solid, change: &[f64; 24]) {
+    #[cfg(test)]
+    pub(crate) fn advance(&mut self, solid: &Solid, change: &[f64; 24]) {
         for ((mode, follow), step) in self.0.iter_mut().zip(&solid.follow).zip(&solid.step) {
             *mode += step + dot(follow, change);
         }
@@ -103,7 +104,7 @@ pub struct Solid {
 
 /// N_a = (1 + ξ ξ_a)(1 + η η_a)(1 + ζ ζ_a)/8.
 #[must_use]
-pub fn shape(natural: DVec3) -> [f64; 8] {
+pub(crate) fn shape(natural: DVec3) -> [f64; 8] {
     CORNERS.map(|c| {
         let f = DVec3::ONE + natural * c;
         0.125 * f.x * f.y * f.z
@@ -112,7 +113,7 @@ pub fn shape(natural: DVec3) -> [f64; 8] {
 
 /// ∂N_a/∂(ξ, η, ζ).
 #[must_use]
-pub fn slopes(natural: DVec3) -> [DVec3; 8] {
+pub(crate) fn slopes(natural: DVec3) -> [DVec3; 8] {
     CORNERS.map(|c| {
         let f = DVec3::ONE + natural * c;
         0.125 * c * DVec3::new(f.y * f.z, f.z * f.x, f.x * f.y)
@@ -127,7 +128,7 @@ pub fn position(nodes: &[DVec3; 8], natural: DVec3) -> DVec3 {
 
 /// ∂x/∂(ξ, η, ζ), one column a direction.
 #[must_use]
-pub fn jacobian(nodes: &[DVec3; 8], natural: DVec3) -> DMat3 {
+pub(crate) fn jacobian(nodes: &[DVec3; 8], natural: DVec3) -> DMat3 {
     jacobian_of(nodes, &slopes(natural))
 }
 
@@ -170,7 +171,8 @@ pub(crate) fn locate(nodes: &[DVec3; 8], point: DVec3) -> Option<DVec3> {
 ///
 /// # Errors
 /// [`ElementError::Inverted`].
-pub fn volume(nodes: &[DVec3; 8]) -> Result<f64, ElementError> {
+#[cfg(test)]
+pub(crate) fn volume(nodes: &[DVec3; 8]) -> Result<f64, ElementError> {
     let mut sum = 0.0;
     for (point, natural) in GAUSS.into_iter().enumerate() {
         sum += right_way_round(jacobian(nodes, natural).determinant(), point)?;

@@ -44,7 +44,7 @@ pub(crate) struct Shell {
 
 /// Forces and moments per length in a frame on the surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Resultants {
+pub(crate) struct Resultants {
     /// Two tangents and the normal. The first tangent is the global x axis projected on the surface
     /// (z where x is the normal), as in Abaqus.
     pub frame: [DVec3; 3],

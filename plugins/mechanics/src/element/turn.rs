@@ -60,8 +60,7 @@ impl Turn {
         let inverse = hex8::jacobian(corners, DVec3::ZERO).inverse().transpose();
         let slopes = hex8::slopes(DVec3::ZERO).map(|slope| inverse * slope);
         let outer = |a: DVec3, b: DVec3| DMat3::from_cols(a * b.x, a * b.y, a * b.z);
-        let gradient =
-            (0..8).fold(DMat3::IDENTITY, |sum, a| sum + outer(at(u, a), slopes[a]));
+        let gradient = (0..8).fold(DMat3::IDENTITY, |sum, a| sum + outer(at(u, a), slopes[a]));
         let rotation = rotation(gradient)?;
         let stretch = rotation.transpose() * gradient;
         let trace = stretch.x_axis.x + stretch.y_axis.y + stretch.z_axis.z;
@@ -97,7 +96,8 @@ impl Turn {
         // K P = K + (K S) H.
         for i in 0..width {
             let row = &mut k[i * width..(i + 1) * width];
-            let lever = (0..nodes).fold(DVec3::ZERO, |sum, a| sum + arms[a].transpose() * at(row, a));
+            let lever =
+                (0..nodes).fold(DVec3::ZERO, |sum, a| sum + arms[a].transpose() * at(row, a));
             for (a, spin) in self.spin.iter().enumerate() {
                 let more = spin.transpose() * lever;
                 (0..3).for_each(|c| row[3 * a + c] += more[c]);

@@ -18,7 +18,7 @@ impl Whole {
     /// By how much displacements are drawn larger than they are: the largest becomes a twentieth of
     /// the structure's size.
     #[must_use]
-    pub fn exaggeration(&self) -> f64 {
+    pub(crate) fn exaggeration(&self) -> f64 {
         let nodes = &self.picture.mesh.nodes;
         let bounds = nodes
             .iter()

@@ -36,17 +36,8 @@ impl Bond {
     /// mm and the clear spacing of ribs (m), τ_f = .4 τ_max.
     #[must_use]
     pub fn good(fcm: f64, rib_spacing: f64) -> Self {
-        Self::pull_out(2.5, fcm, [1e-3, 2e-3, rib_spacing.max(2.5e-3)])
-    }
-
-    /// All other bond conditions: 1.25 √f_cm MPa, s = 1.8 mm, 3.6 mm.
-    #[must_use]
-    pub fn other(fcm: f64, rib_spacing: f64) -> Self {
-        Self::pull_out(1.25, fcm, [1.8e-3, 3.6e-3, rib_spacing.max(4e-3)])
-    }
-
-    fn pull_out(factor: f64, fcm: f64, slips: [f64; 3]) -> Self {
-        let strength = factor * (fcm.max(0.0) / 1e6).sqrt() * 1e6;
+        let slips = [1e-3, 2e-3, rib_spacing.max(2.5e-3)];
+        let strength = 2.5 * (fcm.max(0.0) / 1e6).sqrt() * 1e6;
         let stiffness = strength * INITIAL.powf(0.4) / (INITIAL * slips[0]);
         Self { strength, friction: 0.4 * strength, slips, stiffness }
     }
@@ -118,7 +109,7 @@ mod tests {
 
     #[test]
     fn curve_is_continuous_odd_and_has_its_slope() {
-        let bond = Bond::other(38e6, 8e-3);
+        let bond = Bond::good(38e6, 8e-3);
         for k in 1..20_000 {
             let s = 1e-2 * (f64::from(k) + 0.5) / 20_000.0;
             let ((a, slope), (b, _)) = (bond.envelope(s), bond.envelope(s + 1e-10));

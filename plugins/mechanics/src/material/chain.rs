@@ -73,7 +73,7 @@ impl Chain {
 
     /// A chain that does not age, of units (E_μ in Pa, τ_μ in s); at most [`UNITS`] of them count.
     #[must_use]
-    pub fn constant(units: &[(f64, f64)]) -> Self {
+    pub(crate) fn constant(units: &[(f64, f64)]) -> Self {
         let mut chain = Self::rigid();
         for (i, &(modulus, time)) in units.iter().take(UNITS).enumerate() {
             chain.times[i] = time;

@@ -41,7 +41,7 @@ impl Ingress {
 
     /// Apparent diffusion coefficient at `age` (s), m²/s.
     #[must_use]
-    pub fn diffusion_at(&self, age: f64) -> f64 {
+    pub(crate) fn diffusion_at(&self, age: f64) -> f64 {
         self.diffusion * (self.reference / age.max(1.0)).powf(self.ageing)
     }
 

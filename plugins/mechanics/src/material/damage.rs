@@ -1,8 +1,5 @@
 //! Damage in three dimensions.
 //!
-//! [`Isotropic`] is the plain law σ = (1 − d) C ε: one damage for everything, closed-form tangent,
-//! local or non-local.
-//!
 //! [`Unilateral`] keeps damage of tension and of compression apart and closes cracks. Its energy is
 //! that of Ladevèze (1983) and La Borderie (1991),
 //!
@@ -15,7 +12,6 @@
 //! it is solved without iteration, and at constant damage the tangent is also the secant, symmetric
 //! and positive definite.
 
-use super::softening::Tension;
 use crate::tensor::{self, Equivalent, Frame, Principal, Tangent, Voigt};
 
 /// How three-dimensional strain is compared with the strain at the tensile peak.
@@ -41,74 +37,6 @@ impl Measure {
             Self::ModifiedVonMises { k } => tensor::modified_von_mises(strain, k, nu),
             Self::Mazars => tensor::mazars(strain),
             Self::Rankine => tensor::rankine(strain, nu),
-        }
-    }
-}
-
-/// σ = (1 − d(κ)) C ε with κ the largest equivalent strain so far.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Isotropic {
-    /// Modulus of elasticity, Pa.
-    pub modulus: f64,
-    /// Poisson's ratio.
-    pub poisson: f64,
-    /// What drives damage.
-    pub measure: Measure,
-    /// How it grows.
-    pub softening: Tension,
-}
-
-/// Answer of [`Isotropic`].
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Damaged {
-    /// Pa.
-    pub stress: Voigt,
-    /// (1 − d) C.
-    pub secant: Tangent,
-    /// ∂σ/∂ε along the path; for the non-local law, at constant non-local strain.
-    pub tangent: Tangent,
-    /// Largest equivalent strain, the state of the law.
-    pub kappa: f64,
-    /// Damage.
-    pub damage: f64,
-    /// Local equivalent strain and its derivative.
-    pub local: Equivalent,
-    /// ∂σ/∂(non-local equivalent strain), Pa.
-    pub by_nonlocal: Voigt,
-}
-
-impl Isotropic {
-    /// Answer to `strain` of a point whose largest equivalent strain was `kappa`.
-    #[must_use]
-    pub fn respond(&self, strain: &Voigt, kappa: f64) -> Damaged {
-        let local = self.measure.of(strain, self.poisson);
-        let mut answer = self.respond_nonlocal(strain, local.0, kappa);
-        for i in 0..6 {
-            for j in 0..6 {
-                answer.tangent[i][j] += answer.by_nonlocal[i] * local.1[j];
-            }
-        }
-        answer
-    }
-
-    /// The same, driven by the non-local equivalent strain: the solution e of e − c∇²e = local
-    /// equivalent strain, c = ℓ²/2 (implicit gradient, Peerlings et al. 1996). Coupling: ∂σ/∂e is
-    /// `by_nonlocal`, the source of e has the derivative `local.1`.
-    #[must_use]
-    pub fn respond_nonlocal(&self, strain: &Voigt, nonlocal: f64, kappa: f64) -> Damaged {
-        let (damage, slope) = self.softening.damage(kappa.max(nonlocal));
-        let elastic = tensor::stiffness(self.modulus, self.poisson);
-        let secant = elastic.map(|row| tensor::scale(&row, 1.0 - damage));
-        let effective = tensor::apply(&elastic, strain);
-        let loading = if nonlocal > kappa { slope } else { 0.0 };
-        Damaged {
-            stress: tensor::scale(&effective, 1.0 - damage),
-            secant,
-            tangent: secant,
-            kappa: kappa.max(nonlocal),
-            damage,
-            local: self.measure.of(strain, self.poisson),
-            by_nonlocal: tensor::scale(&effective, -loading),
         }
     }
 }
@@ -284,21 +212,11 @@ impl Split {
 
 #[cfg(test)]
 mod tests {
-    use super::super::softening::MAX_DAMAGE;
     use super::*;
     use crate::tensor::tests::{largest, random};
 
     const E: f64 = 30e9;
     const NU: f64 = 0.2;
-
-    fn isotropic(measure: Measure, h: f64) -> Isotropic {
-        Isotropic {
-            modulus: E,
-            poisson: NU,
-            measure,
-            softening: Tension::new(E, 3e6, 100.0, h).unwrap(),
-        }
-    }
 
     fn assert_tangent(
         tangent: &Tangent,
@@ -320,80 +238,6 @@ mod tests {
                     tangent[i][j]
                 );
             }
-        }
-    }
-
-    #[test]
-    fn tangent_of_isotropic_damage_is_that_of_finite_differences() {
-        for measure in [Measure::ModifiedVonMises { k: 12.0 }, Measure::Mazars, Measure::Rankine] {
-            let law = isotropic(measure, 0.05);
-            for walk in 0..50 {
-                let strain = random(walk, 5e-4);
-                let answer = law.respond(&strain, 0.0);
-                assert_tangent(&answer.tangent, |e| law.respond(e, 0.0).stress, &strain, 1e-6);
-                // Below the largest strain so far, the secant.
-                let unloading = law.respond(&strain, 1e-2);
-                assert_eq!(unloading.tangent, unloading.secant);
-            }
-        }
-    }
-
-    #[test]
-    fn nonlocal_coupling_is_that_of_finite_differences() {
-        let law = isotropic(Measure::ModifiedVonMises { k: 12.0 }, 0.05);
-        let strain = random(3, 5e-4);
-        let stress = |e: f64| law.respond_nonlocal(&strain, e, 1e-4).stress;
-        let (answer, step) = (law.respond_nonlocal(&strain, 4e-4, 1e-4), 1e-9);
-        for i in 0..6 {
-            let numeric = (stress(4e-4 + step)[i] - stress(4e-4 - step)[i]) / (2.0 * step);
-            assert!((numeric - answer.by_nonlocal[i]).abs() < 1e-5 * largest(&answer.by_nonlocal));
-        }
-        assert_eq!(law.respond_nonlocal(&strain, 0.5e-4, 1e-4).by_nonlocal, tensor::ZERO);
-    }
-
-    /// A bar of `n` elements, the first one 1 % weaker, pulled until nothing is left: it takes G_f
-    /// per area whatever the mesh, and its opening at σ = 1 MPa is that of the cohesive crack σ =
-    /// f_t exp(−w f_t/G_f), 39.95 µm for E 30 GPa, f_t 3 MPa, G_f 100 N/m, L 100 mm.
-    #[test]
-    fn bar_localises_with_the_fracture_energy_on_any_mesh() {
-        let (length, ft, gf) = (0.1, 3e6, 100.0);
-        let uniaxial = |strain: f64| [strain, -NU * strain, -NU * strain, 0.0, 0.0, 0.0];
-        for n in [4, 10, 20] {
-            let h = length / f64::from(n);
-            let weak = Isotropic {
-                softening: Tension::new(E, 0.99 * ft, gf, h).unwrap(),
-                ..isotropic(Measure::ModifiedVonMises { k: 10.0 }, h)
-            };
-            let strong = isotropic(Measure::ModifiedVonMises { k: 10.0 }, h);
-            // The strain of the weak element is what is controlled (the bar may snap back); the
-            // others find theirs by equilibrium.
-            let (mut kappa, mut others) = (0.0, vec![0.0; n as usize - 1]);
-            let (mut before, mut work, mut at_one) = ((0.0, 0.0), 0.0, 0.0);
-            for step in 1..=40_000 {
-                let strain = 10.0 * weak.softening.failure * (f64::from(step) / 40_000.0).powi(2);
-                let answer = weak.respond(&uniaxial(strain), kappa);
-                kappa = answer.kappa;
-                let stress = answer.stress[0];
-                let mut elongation = h * strain;
-                for other in &mut others {
-                    let other_strain = stress / E;
-                    let answer = strong.respond(&uniaxial(other_strain), *other);
-                    assert!((answer.stress[0] - stress).abs() < 1e-6 * ft, "not in equilibrium");
-                    *other = answer.kappa;
-                    elongation += h * other_strain;
-                }
-                // What `MAX_DAMAGE` leaves for the solver is no part of the law; beyond it lies up
-                // to .4 % of the work.
-                let stress = if answer.damage < MAX_DAMAGE { stress } else { 0.0 };
-                work += 0.5 * (stress + before.1) * (elongation - before.0);
-                if (before.1 - 1e6) * (stress - 1e6) < 0.0 && strain > 2e-4 {
-                    at_one = elongation;
-                }
-                before = (elongation, stress);
-            }
-            assert!((work / gf - 1.0).abs() < 5e-3, "{n} elements: {work} J/m²");
-            let expected = 3.995_37e-5;
-            assert!((at_one / expected - 1.0).abs() < 0.02, "{n} elements: {at_one} m");
         }
     }
 

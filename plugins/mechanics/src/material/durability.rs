@@ -90,6 +90,30 @@ enum Spread {
     Given(Attack, f64),
 }
 
+/// Why nothing is computed of the rust of a member.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum CorrosionError {
+    /// A drawing without steel, or a model that shows none.
+    #[error("no bars are known of it")]
+    NoBars,
+    /// Nothing says where the member stands.
+    #[error("no exposure class is given: add exposure: (class: \"XC3\", years: …)")]
+    NoClass,
+    /// A file that knows members by their bricks alone.
+    #[error("a deck says nothing of exposure")]
+    Deck,
+    /// Class XD2.
+    #[error(
+        "XD2: how much chloride there is in pools and industrial water no code says: give exposure.chloride"
+    )]
+    UnknownChloride,
+    /// Classes of frost or of other attack on concrete alone.
+    #[error(
+        "{0} speaks of no attack on steel: name an XC, XD or XS class beside it if there is one"
+    )]
+    NoAttack(String),
+}
+
 /// A group of bars that lie alike.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bars {
@@ -152,8 +176,8 @@ impl Corrosion {
     /// By one exposure class alone, see the table of this module: `fck` in Pa, `temperature` in K.
     ///
     /// # Errors
-    /// Why nothing is computed, one line.
-    pub fn of_class(class: &str, fck: f64, temperature: f64) -> Result<Self, String> {
+    /// Why nothing is computed.
+    pub fn of_class(class: &str, fck: f64, temperature: f64) -> Result<Self, CorrosionError> {
         Self::assumed(std::iter::once(class), fck, temperature)
     }
 
@@ -169,28 +193,23 @@ impl Corrosion {
     /// counts.
     ///
     /// # Errors
-    /// Why nothing is computed, one line.
+    /// Why nothing is computed.
     pub(crate) fn assumed<'a>(
         classes: impl Iterator<Item = &'a str>,
         fck: f64,
         temperature: f64,
-    ) -> Result<Self, String> {
+    ) -> Result<Self, CorrosionError> {
         let named: Vec<&str> = classes.collect();
-        let list = named.join(", ");
         if let Some(class) = CHLORIDE.iter().find(|c| named.contains(&c.name)) {
             return Ok(Spread::Salt(class, fck, temperature).corrosion());
         }
         if named.contains(&"XD2") {
-            return Err("XD2: how much chloride there is in pools and industrial water no code says: give exposure.chloride".into());
+            return Err(CorrosionError::UnknownChloride);
         }
         match CARBONATION.iter().find(|c| named.contains(&c.name)) {
             Some(class) => Ok(Spread::Acid(class, fck).corrosion()),
-            None if named.is_empty() => {
-                Err("no exposure class is given: add exposure: (class: \"XC3\", years: …)".into())
-            }
-            None => Err(format!(
-                "{list} speaks of no attack on steel: name an XC, XD or XS class beside it if there is one"
-            )),
+            None if named.is_empty() => Err(CorrosionError::NoClass),
+            None => Err(CorrosionError::NoAttack(named.join(", "))),
         }
     }
 
@@ -677,8 +696,9 @@ mod tests {
         };
         assert_eq!(name(&["XC4", "XD3", "XF4"]), Ok("chloride"));
         assert_eq!(name(&["XC4", "XF1"]), Ok("carbonation"));
-        assert!(name(&["XD2"]).unwrap_err().contains("give exposure.chloride"));
-        assert!(name(&["XF4"]).is_err() && name(&[]).is_err());
+        assert_eq!(name(&["XD2"]), Err(CorrosionError::UnknownChloride));
+        assert_eq!(name(&["XF4"]), Err(CorrosionError::NoAttack("XF4".into())));
+        assert_eq!(name(&[]), Err(CorrosionError::NoClass));
         for class in CHLORIDE.iter().map(|c| c.name).chain(CARBONATION.iter().map(|c| c.name)) {
             let corrosion = of(class, 30e6);
             assert!(

@@ -171,7 +171,8 @@ pub fn reach(edges: &Edges, n: &[f64; 3]) -> f64 {
 impl Step {
     /// A step at 20 °C.
     #[must_use]
-    pub fn between(from: f64, to: f64) -> Self {
+    #[cfg(test)]
+    pub(crate) fn between(from: f64, to: f64) -> Self {
         Self { from, to, temperature: [293.15; 2], edges: None }
     }
 }

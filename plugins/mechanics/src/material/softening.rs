@@ -17,7 +17,7 @@ pub(crate) type Damage = (f64, f64);
 /// Tension: linear to κ₀ = f_t/E, then σ = f_t exp(−(κ − κ₀)/(ε_f − κ₀)) with ε_f = G_f/(h f_t) +
 /// κ₀/2.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Tension {
+pub(crate) struct Tension {
     /// Strain at the peak, f_t/E.
     pub threshold: f64,
     /// Strain ε_f where the tangent at the peak reaches zero stress.

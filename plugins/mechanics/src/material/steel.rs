@@ -39,7 +39,13 @@ impl Bar {
     /// If the yield stress is not between 50 and 3000 MPa.
     pub fn new(yielding: f64) -> Result<Self, Error> {
         checked("yield stress", yielding, 50.0 * MPA, 3000.0 * MPA, "50 MPa to 3000 MPa (in Pa)")?;
-        Ok(Self { modulus: 200e9, yielding, hardening: 2e9, kinematic: 1.0, rupture: f64::INFINITY })
+        Ok(Self {
+            modulus: 200e9,
+            yielding,
+            hardening: 2e9,
+            kinematic: 1.0,
+            rupture: f64::INFINITY,
+        })
     }
 
     /// One that never yields, of a modulus in Pa.
@@ -152,13 +158,6 @@ impl Strand {
     #[must_use]
     pub(crate) fn hardening(&self) -> f64 {
         (self.strength - self.proof) / (RUPTURE - self.proof / self.modulus)
-    }
-
-    /// Largest stress while jacking, min(.8 f_pk, .9 f_p0.1k), and right after, min(.75 f_pk, .85
-    /// f_p0.1k) (EN 1992-1-1 §5.10.2, §5.10.3), Pa.
-    #[must_use]
-    pub fn limits(&self) -> (f64, f64) {
-        ((0.8 * self.strength).min(0.9 * self.proof), (0.75 * self.strength).min(0.85 * self.proof))
     }
 
     /// Stress lost at constant strain `time` (s) after stressing to `initial`, Pa, positive:

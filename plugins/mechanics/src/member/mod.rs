@@ -26,7 +26,10 @@ use warmth::Air;
 
 use crate::{
     element::embed::EmbedError,
-    material::{self, DAY, durability::Corrosion},
+    material::{
+        self, DAY,
+        durability::{Corrosion, CorrosionError},
+    },
     mesh::{
         MeshError,
         voxel::{GeometricError, VoxelError},
@@ -68,7 +71,7 @@ pub struct Prepared {
     /// What a user must know before believing what comes of it: what was given and is not used.
     pub warnings: Vec<String>,
     /// What attacks the steel, from [`Prepared::attacked`] on; or why nothing of that is computed.
-    pub corrosion: Result<Corrosion, String>,
+    pub corrosion: Result<Corrosion, CorrosionError>,
     /// When that begins, s.
     pub attacked: f64,
     /// What a user should know: assumptions, and what was left out.
@@ -91,9 +94,8 @@ impl Prepared {
 
 /// Numbers of a model's loads that come from these of the scene.
 fn raised_by(model: &Model, names: &[&str]) -> Vec<usize> {
-    let comes = |name: &str| {
-        names.iter().any(|n| name == *n || name.strip_suffix(FROM_WHOLE) == Some(*n))
-    };
+    let comes =
+        |name: &str| names.iter().any(|n| name == *n || name.strip_suffix(FROM_WHOLE) == Some(*n));
     (0..model.loads.len()).filter(|&l| comes(&model.loads[l].name)).collect()
 }
 
@@ -230,7 +232,7 @@ pub(crate) struct Draft<'a> {
     pub(crate) axes: Axes,
     pub(crate) model: Model,
     pub(crate) warnings: Vec<String>,
-    pub(crate) corrosion: Result<Corrosion, String>,
+    pub(crate) corrosion: Result<Corrosion, CorrosionError>,
     pub(crate) notes: Vec<String>,
     pub(crate) geometry: Option<GeometricError>,
     /// Warmer air, by load.
@@ -313,7 +315,7 @@ impl<'a> Draft<'a> {
             axes,
             model,
             warnings: Vec::new(),
-            corrosion: Err(String::new()),
+            corrosion: Err(CorrosionError::NoBars),
             notes: Vec::new(),
             geometry: None,
             air: Vec::new(),

@@ -16,7 +16,7 @@ use crate::{
         bond::Bond,
         chloride::Ingress,
         concrete::Class,
-        durability::{Attack, Corrosion},
+        durability::{Attack, Corrosion, CorrosionError},
         steel::{Bar, Relaxation, Strand},
     },
     mesh::{HexFace, Locator, Mesh, voxel::distance::Triangles},
@@ -196,9 +196,9 @@ impl Draft<'_> {
 
     /// What attacks its steel: by the scene's own chloride, else by its exposure class; or why that
     /// is not computed.
-    fn corrosion(&self) -> Result<Result<Corrosion, String>, MemberError> {
+    fn corrosion(&self) -> Result<Result<Corrosion, CorrosionError>, MemberError> {
         if self.member.steel.is_empty() {
-            return Ok(Err("no bars are known of it".into()));
+            return Ok(Err(CorrosionError::NoBars));
         }
         let Some(exposure) = &self.member.exposure else {
             return Ok(Corrosion::assumed(std::iter::empty(), 0.0, self.model.temperature));

@@ -121,7 +121,7 @@ pub fn block(x: &[f64], y: &[f64], z: &[f64], region: &str) -> Result<Mesh, Mesh
 /// # Errors
 /// Too many elements, or elements that [`Mesh::check`] refuses (inverted ones by a left-handed or
 /// folded map, for example).
-pub fn mapped(
+pub(crate) fn mapped(
     cells: [usize; 3],
     regions: &[&str],
     point: impl Fn(usize, usize, usize) -> DVec3,

@@ -3,7 +3,9 @@
 
 use glam::DVec3;
 
-pub use crate::element::hex8::{CORNERS, jacobian, position as place, shape, slopes as gradients};
+pub(crate) use crate::element::hex8::{CORNERS, jacobian, position as place};
+#[cfg(test)]
+use crate::element::hex8::{shape, slopes as gradients};
 
 /// Corners of the faces S1 to S6 of Abaqus, counterclockwise seen from outside: ζ = −1, ζ = 1, η =
 /// −1, ξ = 1, η = 1, ξ = −1.

@@ -1,101 +1,12 @@
-//! Blocks to bodies, and bodies cut open.
+//! Bodies cut open, and points that are one.
 
 use std::collections::HashMap;
 
 use glam::{DVec3, I64Vec3};
 
-use super::{Cell, ElementId, FaceTable, HexFace, Interface, Mesh, MeshError};
+use super::{FaceTable, HexFace, Interface, Mesh};
 
 impl Mesh {
-    /// Adds another mesh beside this one. Regions and sets of equal names become one; nodes stay
-    /// apart until [`Mesh::merge`]. Labels are dropped.
-    pub fn append(&mut self, other: &Self) {
-        let [nodes, hexes, shells, rods, interfaces] = [
-            self.nodes.len(),
-            self.hexes.len(),
-            self.shells.len(),
-            self.rods.len(),
-            self.interfaces.len(),
-        ]
-        .map(|n| n as u32);
-        let regions: Vec<u32> = other.regions.iter().map(|r| self.region(r)).collect();
-        self.nodes.extend(&other.nodes);
-        fn shift<const N: usize>(
-            cells: &[Cell<N>],
-            nodes: u32,
-            regions: &[u32],
-        ) -> impl Iterator<Item = Cell<N>> {
-            cells.iter().map(move |c| Cell {
-                nodes: c.nodes.map(|n| n + nodes),
-                region: regions[c.region as usize],
-            })
-        }
-        self.hexes.extend(shift(&other.hexes, nodes, &regions));
-        self.shells.extend(shift(&other.shells, nodes, &regions));
-        self.rods.extend(shift(&other.rods, nodes, &regions));
-        self.interfaces.extend(shift(&other.interfaces, nodes, &regions));
-        for (name, set) in &other.node_sets {
-            self.node_sets.entry(name.clone()).or_default().extend(set.iter().map(|n| n + nodes));
-        }
-        for (name, set) in &other.face_sets {
-            self.face_sets
-                .entry(name.clone())
-                .or_default()
-                .extend(set.iter().map(|f| HexFace { hex: f.hex + hexes, ..*f }));
-        }
-        for (name, set) in &other.element_sets {
-            self.element_sets.entry(name.clone()).or_default().extend(set.iter().map(
-                |e| match *e {
-                    ElementId::Hex(i) => ElementId::Hex(i + hexes),
-                    ElementId::Shell(i) => ElementId::Shell(i + shells),
-                    ElementId::Rod(i) => ElementId::Rod(i + rods),
-                    ElementId::Interface(i) => ElementId::Interface(i + interfaces),
-                },
-            ));
-        }
-        self.labels = super::Labels::default();
-    }
-
-    /// Makes one node of all that are within `tolerance` (m) of the first of them, and tells how
-    /// many went. Merge before interfaces are put in: their two sides are in one place too. Sides
-    /// that have become inner ones leave the face sets.
-    ///
-    /// # Errors
-    /// The tolerance is not above 0, or so large that elements collapse.
-    pub fn merge(&mut self, tolerance: f64) -> Result<usize, MeshError> {
-        if !(tolerance > 0.0 && tolerance.is_finite()) {
-            return Err(MeshError::whole(format!(
-                "nodes cannot be merged within {tolerance} m; give a tolerance above 0"
-            )));
-        }
-        if !self.interfaces.is_empty() {
-            return Err(MeshError::whole(
-                "nodes of interfaces must stay apart: merge first, then separate",
-            ));
-        }
-        let mut merged = self.clone();
-        let (target, kept) = first_within(&merged.nodes, tolerance);
-        merged.nodes = kept;
-        let renumber = |n: &mut u32| *n = target[*n as usize];
-        merged.hexes.iter_mut().flat_map(|c| &mut c.nodes).for_each(renumber);
-        merged.shells.iter_mut().flat_map(|c| &mut c.nodes).for_each(renumber);
-        merged.rods.iter_mut().flat_map(|c| &mut c.nodes).for_each(renumber);
-        for set in merged.node_sets.values_mut() {
-            set.iter_mut().for_each(renumber);
-            set.sort_unstable();
-            set.dedup();
-        }
-        merged.labels.nodes.clear();
-        let table = merged.face_table();
-        let inner: std::collections::HashSet<HexFace> = table.inner().flatten().collect();
-        merged.face_sets.values_mut().for_each(|set| set.retain(|f| !inner.contains(f)));
-        merged.face_sets.retain(|_, set| !set.is_empty());
-        merged.check()?;
-        let gone = self.nodes.len() - merged.nodes.len();
-        *self = merged;
-        Ok(gone)
-    }
-
     /// Cuts the body open along inner faces: where `cut` names a region for a face (its two sides,
     /// the lower hexahedron first), nodes are doubled and an interface of that region is put
     /// between. Where cuts cross or end, every piece keeps what still hangs together through uncut
@@ -267,24 +178,6 @@ pub(super) fn first_within(points: &[DVec3], tolerance: f64) -> (Vec<u32>, Vec<D
 mod tests {
     use super::super::{Shell, block};
     use super::*;
-
-    #[test]
-    fn two_blocks_become_one() {
-        let mut mesh = block(&[0.0, 1.0], &[0.0, 1.0, 2.0], &[0.0, 1.0], "a").unwrap();
-        let mut other = block(&[0.0, 2.0], &[0.0, 1.0, 2.0], &[0.0, 1.0], "b").unwrap();
-        other.transform(|p| p + DVec3::new(1.0 + 1e-8, 1e-8, -1e-8));
-        mesh.append(&other);
-        assert_eq!(mesh.bodies().1, 2);
-        assert_eq!(mesh.merge(1e-6), Ok(6));
-        assert_eq!((mesh.nodes.len(), mesh.hexes.len(), mesh.bodies().1), (18, 4, 1));
-        assert_eq!(mesh.regions, ["a", "b"]);
-        // The faces that met are inside now; x0 of the first and x1 of the second are left.
-        assert_eq!((mesh.face_sets["x0"].len(), mesh.face_sets["x1"].len()), (2, 2));
-        let whole = mesh.clone();
-        assert!(mesh.merge(1.5).unwrap_err().reason.contains("occurs twice"));
-        assert_eq!(mesh, whole);
-        assert!(mesh.merge(0.0).is_err());
-    }
 
     #[test]
     fn merging_does_not_depend_on_boxes() {

@@ -6,7 +6,7 @@ use super::Mesh;
 use crate::element::hex8;
 
 /// A point is inside as long as its natural coordinates stay within ±(1 + this).
-pub const TOLERANCE: f64 = 1e-6;
+pub(crate) const TOLERANCE: f64 = 1e-6;
 
 /// Where a point is in the mesh.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -127,60 +127,6 @@ impl<'a> Locator<'a> {
         }
         best.map(|(_, host)| host)
     }
-
-    /// The hexahedron nearest to a point within `reach` (m), its natural coordinates clamped to ±1,
-    /// and the distance, m: for tendons that leave a faceted surface by the height of an arc. Exact
-    /// where elements are parallelepipeds, else good to the square of the distance over the
-    /// element.
-    #[must_use]
-    pub fn nearest(&self, point: DVec3, reach: f64) -> Option<(Host, f64)> {
-        if let Some(host) = self.locate(point) {
-            return Some((host, 0.0));
-        }
-        if !(point.is_finite() && reach > 0.0) {
-            return None;
-        }
-        let (low, high) = (point - reach, point + reach);
-        let mut best: Option<(f64, Host)> = None;
-        for hex in self.candidates(low, high) {
-            let corners = self.mesh.corners(hex);
-            let Some(natural) = clamped(&corners, point) else { continue };
-            let distance = hex8::position(&corners, natural).distance(point);
-            if distance <= reach && best.is_none_or(|(d, host)| (distance, hex) < (d, host.hex)) {
-                best = Some((distance, Host { hex, natural }));
-            }
-        }
-        best.map(|(distance, host)| (host, distance))
-    }
-}
-
-/// The point of a hexahedron nearest to `point`: Gauss–Newton steps on the squared distance, one
-/// coordinate after another held at ±1.
-fn clamped(corners: &[DVec3; 8], point: DVec3) -> Option<DVec3> {
-    let (low, high) = (DVec3::splat(-1.0), DVec3::ONE);
-    let mut xi = DVec3::ZERO;
-    for _ in 0..50 {
-        let jacobian = hex8::jacobian(corners, xi);
-        let miss = point - hex8::position(corners, xi);
-        // Coordinate descent on |J dξ − miss|² within the cube: convex, so that the sweep converges
-        // to its minimum.
-        let (normal, right) = (jacobian.transpose() * jacobian, jacobian.transpose() * miss);
-        let mut step = DVec3::ZERO;
-        for _ in 0..30 {
-            for a in 0..3 {
-                let rest = right[a] - normal.row(a).dot(step) + normal.col(a)[a] * step[a];
-                step[a] = (rest / normal.col(a)[a]).clamp(low[a] - xi[a], high[a] - xi[a]);
-            }
-        }
-        if !step.is_finite() {
-            return None;
-        }
-        xi = (xi + step).clamp(low, high);
-        if step.abs().max_element() < 1e-12 {
-            break;
-        }
-    }
-    Some(xi)
 }
 
 fn around(corners: &[DVec3; 8]) -> [DVec3; 2] {
@@ -222,19 +168,14 @@ mod tests {
     }
 
     #[test]
-    fn outside_is_outside_and_nearest_says_how_far() {
+    fn outside_is_outside() {
         let mesh = ring();
         let grid = Locator::new(&mesh);
         assert_eq!(grid.locate(DVec3::new(0.0, 0.0, 0.5)), None);
         assert_eq!(grid.locate(DVec3::new(100.0, 0.0, 0.5)), None);
         assert_eq!(grid.locate(DVec3::NAN), None);
-        assert_eq!(grid.nearest(DVec3::ZERO, 0.5), None);
         let brick = block(&[0.0, 1.0, 2.0], &[0.0, 1.0], &[0.0, 1.0], "c").unwrap();
         let grid = Locator::new(&brick);
-        let (host, distance) = grid.nearest(DVec3::new(1.5, 1.3, -0.4), 1.0).unwrap();
-        assert_eq!(host, Host { hex: 1, natural: DVec3::new(0.0, 1.0, -1.0) });
-        assert!((distance - 0.5).abs() < 1e-12);
-        assert!(grid.nearest(DVec3::new(1.5, 1.3, -0.4), 0.4).is_none());
         // A corner node is in the mesh, by the tolerance; a point 1e-5 outside is not.
         assert!(grid.locate(DVec3::new(2.0, 1.0, 1.0)).is_some());
         assert!(grid.locate(DVec3::new(2.0 + 1e-5, 1.0, 1.0)).is_none());

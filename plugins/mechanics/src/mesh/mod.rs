@@ -3,8 +3,7 @@
 //! - [`Mesh`]: nodes, elements, named sets; [`Mesh::check`] refuses what cannot be computed.
 //! - [`section`] (rectangle, box girder, disc, extruded), [`block`], [`mapped`], [`Polar`] (rings
 //!   and linings in r-θ-z): structured meshes.
-//! - [`Mesh::append`], [`Mesh::merge`], [`Mesh::separate`]: blocks become one body, a body is cut
-//!   open and interfaces put between.
+//! - [`Mesh::separate`]: a body is cut open and interfaces put between.
 //! - [`Mesh::refine`]: every hexahedron into equal parts.
 //! - [`voxel`]: any closed surface to cubes, with the error that this makes.
 //! - [`Locator`]: which hexahedron holds a point, and where in it.
@@ -26,8 +25,9 @@ use std::{collections::BTreeMap, fmt};
 
 use glam::DVec3;
 
-pub use generate::{block, divide, mapped};
-pub use locate::{Host, Locator, TOLERANCE};
+pub(crate) use generate::mapped;
+pub use generate::{block, divide};
+pub use locate::{Host, Locator};
 pub(crate) use polar::{Layer, Polar, Rings};
 pub(crate) use topology::FaceTable;
 
@@ -237,15 +237,6 @@ impl Mesh {
     /// Moves every node.
     pub fn transform(&mut self, place: impl Fn(DVec3) -> DVec3) {
         self.nodes.iter_mut().for_each(|p| *p = place(*p));
-    }
-
-    /// All nodes within `reach` of where `distance` is zero become a node set, for example
-    /// `|p| p.y - 0.5`.
-    pub fn name_nodes(&mut self, name: &str, reach: f64, distance: impl Fn(DVec3) -> f64) {
-        let nodes = (0..self.nodes.len() as u32)
-            .filter(|&n| distance(self.nodes[n as usize]).abs() <= reach)
-            .collect();
-        self.node_sets.insert(name.to_owned(), nodes);
     }
 
     /// What the user calls an element: `hex 17`, with the label of their file where there is one.

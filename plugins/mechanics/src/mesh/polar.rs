@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 use glam::DVec3;
 
 use super::{
-    ElementId, HexFace, Mesh, MeshError, divide,
+    ElementId, Mesh, MeshError, divide,
     generate::{Lattice, ascending},
 };
 
@@ -270,14 +270,7 @@ impl Polar {
     }
 }
 
-impl Mesh {
-    /// Faces of a set turned to cylinder coordinates: middle (r, θ, z) of a face.
-    #[must_use]
-    pub fn face_polar(&self, face: HexFace) -> DVec3 {
-        let p = self.face_middle(face).0;
-        DVec3::new(p.x.hypot(p.y), p.y.atan2(p.x), p.z)
-    }
-}
+impl Mesh {}
 
 fn at(radius: f64, angle: f64, z: f64) -> DVec3 {
     let (sin, cos) = angle.sin_cos();

@@ -78,7 +78,8 @@ impl Mesh {
     /// Bodies: for every hexahedron the number of its face-connected piece, counted from 0 in the
     /// order of their first element, and how many there are.
     #[must_use]
-    pub fn bodies(&self) -> (Vec<u32>, u32) {
+    #[cfg(test)]
+    pub(crate) fn bodies(&self) -> (Vec<u32>, u32) {
         let neighbours = self.neighbours();
         let mut body = vec![u32::MAX; self.hexes.len()];
         let (mut count, mut stack) = (0, Vec::new());

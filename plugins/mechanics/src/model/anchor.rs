@@ -112,12 +112,7 @@ impl System<'_> {
     }
 
     /// The same of a whole tendon without bond, in the mean; nothing for other steel.
-    pub(super) fn seated_mean(
-        &self,
-        bar: usize,
-        moved: impl Fn(usize) -> Moved,
-        x: &[f64],
-    ) -> f64 {
+    pub(super) fn seated_mean(&self, bar: usize, moved: impl Fn(usize) -> Moved, x: &[f64]) -> f64 {
         let pieces = &self.model.steel[bar].pieces;
         let Some(last) = pieces.len().checked_sub(1) else { return 0.0 };
         let ends = if last == 0 { 0..1 } else { 0..2 };
@@ -151,9 +146,8 @@ impl System<'_> {
             .strain_row()
             .map_err(|source| Failure::Element { element: steel.name.clone(), source })?
             .to_vec();
-        let strain =
-            row.iter().zip(&moved.local).map(|(r, u)| r * u).sum::<f64>()
-                + self.seated(bar, piece, moved, x);
+        let strain = row.iter().zip(&moved.local).map(|(r, u)| r * u).sum::<f64>()
+            + self.seated(bar, piece, moved, x);
         let along = (of.ends[1] - of.ends[0]).normalize_or_zero();
         for (end, plate) in steel.plates(piece) {
             let share =

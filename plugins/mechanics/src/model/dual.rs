@@ -96,7 +96,7 @@ impl System<'_> {
     ///
     /// # Errors
     /// [`Failure`].
-    pub fn influences(
+    pub(crate) fn influences(
         &self,
         gauges: &[Gauge],
         history: &History,
@@ -177,9 +177,7 @@ impl System<'_> {
         let mut answers = [([0.0; 6], [[0.0; 6]; 6]); 8];
         let mut modes = trial.history.modes[hex];
         let u = self.moved(hex, trial.history, &trial.history.x)?.local;
-        self.brick(hex, trial, &u, &mut modes, |point, a| {
-            answers[point] = (a.stress, a.tangent)
-        })?;
+        self.brick(hex, trial, &u, &mut modes, |point, a| answers[point] = (a.stress, a.tangent))?;
         Ok((answers, u, modes))
     }
 

@@ -21,7 +21,7 @@ pub struct History {
     /// Internal forces, three a node, N: what supports bear where nothing else acts.
     pub force: Vec<f64>,
     /// One a brick.
-    pub modes: Vec<Modes>,
+    pub(crate) modes: Vec<Modes>,
     /// One a brick.
     pub points: Vec<Memory>,
     /// Displacements in which an element was born, for those that were born after the beginning:

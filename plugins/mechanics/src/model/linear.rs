@@ -192,7 +192,7 @@ impl Linear<'_, '_> {
 
     /// g of a gauge, over all unknowns.
     #[must_use]
-    pub fn response(&self, gauge: usize) -> Vec<f64> {
+    pub(crate) fn response(&self, gauge: usize) -> Vec<f64> {
         let mut all = vec![0.0; self.structure.unknowns()];
         self.gauges[gauge].iter().for_each(|(hex, row)| self.structure.spread(*hex, row, &mut all));
         all

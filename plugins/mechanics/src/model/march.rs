@@ -619,13 +619,7 @@ impl Aim {
     }
 
     /// What is out of balance at `x`; `scale` keeps the largest of all that has acted in this step.
-    fn balance(
-        &mut self,
-        x: &[f64],
-        factor: f64,
-        force: &[f64],
-        scale: &mut f64,
-    ) -> Balance {
+    fn balance(&mut self, x: &[f64], factor: f64, force: &[f64], scale: &mut f64) -> Balance {
         let acting: Vec<f64> = (0..x.len())
             .map(|i| self.given[i] + self.reference.get(i).map_or(0.0, |r| factor * r))
             .collect();

@@ -27,8 +27,10 @@ pub use law::{Elastic, Matter, Memory, Record};
 pub use linear::Linear;
 pub use march::{Control, Drive, Failure, March, MarchSettings, Step};
 pub use nonlocal::Regularisation;
-pub use steel::{JACKING, Piecework, Rust, Slipping, Steel, SteelKind, Tendon};
-pub use structure::{Point, System, Trial};
+pub(crate) use steel::JACKING;
+pub use steel::{Piecework, Rust, Slipping, Steel, SteelKind, Tendon};
+pub(crate) use structure::Trial;
+pub use structure::{Point, System};
 pub use thin::Rotations;
 
 use std::collections::BTreeMap;
@@ -83,7 +85,7 @@ impl Model {
     /// What a crack leaves in its concrete and what gives it its width, in words; none without
     /// concrete.
     #[must_use]
-    pub fn cracking(&self) -> Option<String> {
+    pub(crate) fn cracking(&self) -> Option<String> {
         let law = |body: &Body| {
             if let Matter::Concrete(mix) = &body.matter { Some(mix.1.cracks) } else { None }
         };
@@ -162,14 +164,14 @@ pub const CONDUCTED: &str = "conducted heat";
 impl Load {
     /// Its factor at a time.
     #[must_use]
-    pub fn factor(&self, time: f64) -> f64 {
+    pub(crate) fn factor(&self, time: f64) -> f64 {
         interpolate(&self.history, time).unwrap_or(1.0)
     }
 }
 
 /// Linear between points (ascending in the first number), constant outside; `None` without points.
 #[must_use]
-pub fn interpolate(points: &[(f64, f64)], at: f64) -> Option<f64> {
+pub(crate) fn interpolate(points: &[(f64, f64)], at: f64) -> Option<f64> {
     let i = points.partition_point(|p| p.0 <= at);
     match (i.checked_sub(1).map(|i| points[i]), points.get(i)) {
         (Some((t0, f0)), Some(&(t1, f1))) => Some(f0 + (f1 - f0) * (at - t0) / (t1 - t0)),

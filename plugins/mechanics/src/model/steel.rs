@@ -109,7 +109,7 @@ pub struct Piecework {
 }
 
 /// How long jacking takes, s.
-pub const JACKING: f64 = 21_600.0;
+pub(crate) const JACKING: f64 = 21_600.0;
 
 impl Steel {
     /// What its pieces remember before anything has happened.
@@ -172,13 +172,13 @@ impl Steel {
                     return (stress, 0.0, Piecework { locked, stress, ..*before });
                 }
                 let strand = &tendon.strand;
-                let relaxed = before.relaxed
-                    + strand.relax(before.stress, before.relaxed, span[1] - span[0]);
+                let relaxed =
+                    before.relaxed + strand.relax(before.stress, before.relaxed, span[1] - span[0]);
                 let strained = strain - before.locked - before.bar.plastic;
                 let trial = tendon.stress[piece] + strand.modulus * strained - relaxed;
                 // Beyond the proof stress it hardens; plastic strain is kept as that of a bar is.
-                let slower = strand.modulus * strand.hardening()
-                    / (strand.modulus - strand.hardening());
+                let slower =
+                    strand.modulus * strand.hardening() / (strand.modulus - strand.hardening());
                 let over = trial - strand.proof - slower * before.bar.accumulated;
                 if over <= 0.0 {
                     return (trial, slope, Piecework { relaxed, stress: trial, ..*before });

@@ -47,7 +47,7 @@ pub struct System<'m> {
 
 /// A step that is being tried: from a history to a moment.
 #[derive(Debug, Clone, Copy)]
-pub struct Trial<'a> {
+pub(crate) struct Trial<'a> {
     /// Where it starts.
     pub history: &'a History,
     /// When it ends, s.

@@ -162,10 +162,8 @@ fn a_displacement_is_controlled() {
         };
         model.loads.push(Load { name: "drive".into(), action, history: vec![(0.0, 0.0)] });
         let structure = System::new(&model).unwrap();
-        let drive = Drive::Raised {
-            loads: vec![(0, 1.0)],
-            control: Control::Row(vec![(middle, 0, 1.0)]),
-        };
+        let drive =
+            Drive::Raised { loads: vec![(0, 1.0)], control: Control::Row(vec![(middle, 0, 1.0)]) };
         let mut march =
             March::new(&structure, structure.rest(0.0), drive, MarchSettings::default());
         march.advance(1.0, 1e-4, &Job::default(), |_, _| Ok(())).unwrap();

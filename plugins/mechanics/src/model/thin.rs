@@ -9,10 +9,7 @@ use glam::DVec3;
 
 use super::{Action, Elastic, Failure, History, Matter, System, Trial};
 use crate::{
-    element::{
-        Element, quad, rod,
-        shell::{Resultants, Shell},
-    },
+    element::{Element, quad, rod, shell::Shell},
     material::steel::{Bar, BarState},
     mesh::{ElementId, Mesh},
     sparse::{Connectivity, Kind, Place},
@@ -73,12 +70,6 @@ struct Rod<'a> {
 }
 
 impl System<'_> {
-    /// The number of the node that is this node's rotation, if it belongs to a shell.
-    #[must_use]
-    pub fn rotation_of(&self, node: u32) -> Option<u32> {
-        self.rotations.of(node)
-    }
-
     /// Adds shells and rods to the elements.
     ///
     /// # Errors
@@ -219,12 +210,13 @@ impl System<'_> {
     ///
     /// # Errors
     /// [`Failure::Element`] if it is folded.
-    pub fn resultants(
+    #[cfg(test)]
+    pub(crate) fn resultants(
         &self,
         shell: usize,
         [r, s]: [f64; 2],
         history: &History,
-    ) -> Result<Resultants, Failure> {
+    ) -> Result<crate::element::shell::Resultants, Failure> {
         let (element, elastic) = self.shell(shell)?;
         let [_, warmth] = self.warmth([history.time; 2]);
         let warm = self.thin_warmth(self.model.mesh.shells[shell].nodes, &warmth);

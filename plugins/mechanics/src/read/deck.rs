@@ -13,21 +13,21 @@ pub struct Deck {
     /// Nodes, elements and sets; region i is section i.
     pub mesh: Mesh,
     /// How each hexahedron is to be computed.
-    pub formulations: Vec<Formulation>,
+    pub(crate) formulations: Vec<Formulation>,
     /// Materials, each with at least what the file gives.
     pub materials: Vec<Material>,
     /// One a region.
     pub sections: Vec<Section>,
     /// Loads over time.
-    pub amplitudes: Vec<Amplitude>,
+    pub(crate) amplitudes: Vec<Amplitude>,
     /// Supports that hold from the beginning.
     pub boundary: Vec<Fixed>,
     /// Stress before the first step.
-    pub initial_stress: Vec<InitialStress>,
+    pub(crate) initial_stress: Vec<InitialStress>,
     /// Temperature of nodes before the first step (nodes not named: 0).
     pub initial_temperature: Vec<(u32, f64)>,
     /// Bars that move with the solids around them.
-    pub embedded: Vec<Embedded>,
+    pub(crate) embedded: Vec<Embedded>,
     /// In order.
     pub steps: Vec<Step>,
     /// What the user should know: cards that were skipped, elements that are computed otherwise.
@@ -36,7 +36,7 @@ pub struct Deck {
 
 /// How a hexahedron is computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Formulation {
+pub(crate) enum Formulation {
     /// Plain trilinear with 2×2×2 points (C3D8): locks in bending.
     Full,
     /// With incompatible modes (C3D8I).
@@ -69,12 +69,12 @@ pub struct Section {
     /// Index into [`Deck::materials`].
     pub material: u32,
     /// Its measure.
-    pub kind: SectionKind,
+    pub(crate) kind: SectionKind,
 }
 
 /// The measure of a section.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum SectionKind {
+pub(crate) enum SectionKind {
     /// Hexahedra.
     Solid,
     /// Rods.
@@ -91,7 +91,7 @@ pub enum SectionKind {
 
 /// A factor over time, linear between points, constant outside.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Amplitude {
+pub(crate) struct Amplitude {
     /// Name in the file.
     pub name: String,
     /// Time (s) and factor, times ascending.
@@ -164,7 +164,7 @@ pub struct Temperature {
 
 /// Stress that an element has before the first step, Pa.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct InitialStress {
+pub(crate) struct InitialStress {
     /// Name of the element.
     pub element: ElementId,
     /// xx, yy, zz, xy, yz, zx; of a rod: its axial stress first.
@@ -173,7 +173,7 @@ pub struct InitialStress {
 
 /// Bars that move with the solids around them.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Embedded {
+pub(crate) struct Embedded {
     /// Rods.
     pub rods: Vec<u32>,
     /// Hexahedra that may hold them; empty: all.
@@ -182,7 +182,7 @@ pub struct Embedded {
 
 /// Elements that are taken out or put in at the beginning of a step.
 #[derive(Debug, Clone, PartialEq)]
-pub struct ModelChange {
+pub(crate) struct ModelChange {
     /// Put in, free of strain, rather than taken out.
     pub add: bool,
     /// Their elements.
@@ -212,5 +212,5 @@ pub struct Step {
     /// Temperatures.
     pub temperatures: Vec<Temperature>,
     /// Births and removals, of this step only.
-    pub changes: Vec<ModelChange>,
+    pub(crate) changes: Vec<ModelChange>,
 }

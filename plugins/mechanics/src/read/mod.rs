@@ -23,7 +23,7 @@ pub(crate) use deck::{
 };
 
 /// The largest file that is read, bytes.
-pub const MAX_BYTES: u64 = 2 << 30;
+pub(crate) const MAX_BYTES: u64 = 2 << 30;
 /// Entries that sets, loads and supports of one file may expand to.
 const MAX_ENTRIES: usize = 50_000_000;
 
@@ -39,7 +39,7 @@ pub enum Units {
 impl Units {
     /// Metres.
     #[must_use]
-    pub fn length(self) -> f64 {
+    pub(crate) fn length(self) -> f64 {
         match self {
             Self::MetreNewton => 1.0,
             Self::MillimetreNewton => 1e-3,
@@ -48,13 +48,13 @@ impl Units {
 
     /// Square metres.
     #[must_use]
-    pub fn area(self) -> f64 {
+    pub(crate) fn area(self) -> f64 {
         self.length() * self.length()
     }
 
     /// Pascal.
     #[must_use]
-    pub fn stress(self) -> f64 {
+    pub(crate) fn stress(self) -> f64 {
         match self {
             Self::MetreNewton => 1.0,
             Self::MillimetreNewton => 1e6,
@@ -63,7 +63,7 @@ impl Units {
 
     /// Kilogram per cubic metre.
     #[must_use]
-    pub fn density(self) -> f64 {
+    pub(crate) fn density(self) -> f64 {
         match self {
             Self::MetreNewton => 1.0,
             Self::MillimetreNewton => 1e12,
@@ -72,7 +72,7 @@ impl Units {
 
     /// J/(kg·K): the square of the unit of velocity.
     #[must_use]
-    pub fn specific_heat(self) -> f64 {
+    pub(crate) fn specific_heat(self) -> f64 {
         match self {
             Self::MetreNewton => 1.0,
             Self::MillimetreNewton => 1e-6,
@@ -80,14 +80,19 @@ impl Units {
     }
 }
 
-impl FromStr for Units {
-    type Err = String;
+/// Units that no deck is read in, as they were given.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("units {0:?}: give \"m,N\" or \"mm,N\"")]
+pub struct UnitsError(String);
 
-    fn from_str(text: &str) -> Result<Self, String> {
+impl FromStr for Units {
+    type Err = UnitsError;
+
+    fn from_str(text: &str) -> Result<Self, UnitsError> {
         match text.replace(' ', "").as_str() {
             "m,N" => Ok(Self::MetreNewton),
             "mm,N" => Ok(Self::MillimetreNewton),
-            _ => Err(format!("units {text:?}: give \"m,N\" or \"mm,N\"")),
+            _ => Err(UnitsError(text.to_owned())),
         }
     }
 }
@@ -236,7 +241,7 @@ mod tests {
     fn units_are_named() {
         assert_eq!("m,N".parse(), Ok(Units::MetreNewton));
         assert_eq!("mm, N".parse(), Ok(Units::MillimetreNewton));
-        assert!("in,lbf".parse::<Units>().unwrap_err().contains("m,N"));
+        assert!("in,lbf".parse::<Units>().unwrap_err().to_string().contains("m,N"));
         // 7850 kg/m³ is 7.85e-9 t/mm³; 9810 mm/s² is 9.81 m/s²; force = density · volume ·
         // acceleration stays newton.
         let mm = Units::MillimetreNewton;

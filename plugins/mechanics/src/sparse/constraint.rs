@@ -97,24 +97,6 @@ impl<const B: usize> Constraints<B> {
         Ok(())
     }
 
-    /// Number of directions held.
-    pub fn len(&self) -> usize {
-        self.holds.values().map(|h| h.held.len()).sum()
-    }
-
-    /// Whether nothing is held.
-    pub fn is_empty(&self) -> bool {
-        self.holds.is_empty()
-    }
-
-    /// The same directions with every value multiplied: a load step.
-    #[must_use]
-    pub fn scaled(&self, factor: f64) -> Self {
-        let mut scaled = self.clone();
-        scaled.holds.values_mut().flat_map(|h| &mut h.held).for_each(|(_, v)| *v *= factor);
-        scaled
-    }
-
     /// Number of nodes of the matrix that it belongs to.
     pub(super) fn nodes(&self) -> usize {
         self.nodes

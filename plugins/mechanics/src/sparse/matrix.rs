@@ -25,7 +25,7 @@ impl<const B: usize> BlockMatrix<B> {
     }
 
     /// The blocks that it has.
-    pub fn pattern(&self) -> &Arc<Pattern> {
+    pub(crate) fn pattern(&self) -> &Arc<Pattern> {
         &self.pattern
     }
 
@@ -40,7 +40,7 @@ impl<const B: usize> BlockMatrix<B> {
     }
 
     /// Sets every value to zero; the pattern stays.
-    pub fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         self.values.par_chunks_mut(1 << 12).for_each(|c| c.fill([[0.0; B]; B]));
     }
 
@@ -48,13 +48,15 @@ impl<const B: usize> BlockMatrix<B> {
     ///
     /// # Panics
     /// If there is no such node or component.
-    pub fn add_spring(&mut self, node: usize, component: usize, stiffness: f64) {
+    #[cfg(test)]
+    pub(crate) fn add_spring(&mut self, node: usize, component: usize, stiffness: f64) {
         let d = self.diagonal_at(node);
         self.values[d][component][component] += stiffness;
     }
 
     /// The block that joins two nodes; `None` where the pattern has none.
-    pub fn block(&self, row: usize, column: usize) -> Option<&[[f64; B]; B]> {
+    #[cfg(test)]
+    pub(crate) fn block(&self, row: usize, column: usize) -> Option<&[[f64; B]; B]> {
         let at = self.pattern.row(row).binary_search(&(column as u32)).ok()?;
         self.values.get(self.pattern.starts[row] + at)
     }

@@ -20,26 +20,21 @@ impl Default for Connectivity {
 
 impl Connectivity {
     /// Appends an element.
-    pub fn push(&mut self, nodes: &[u32]) {
+    pub(crate) fn push(&mut self, nodes: &[u32]) {
         self.nodes.extend_from_slice(nodes);
         self.starts.push(self.nodes.len());
     }
 
     /// Number of elements.
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.starts.len() - 1
-    }
-
-    /// Whether there is none.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
     }
 
     /// The nodes of element `e`.
     ///
     /// # Panics
     /// If there is no such element.
-    pub fn get(&self, e: usize) -> &[u32] {
+    pub(crate) fn get(&self, e: usize) -> &[u32] {
         &self.nodes[self.starts[e]..self.starts[e + 1]]
     }
 }
@@ -138,12 +133,12 @@ impl Pattern {
     }
 
     /// Number of nodes.
-    pub fn nodes(&self) -> usize {
+    pub(crate) fn nodes(&self) -> usize {
         self.places.len()
     }
 
     /// Number of blocks.
-    pub fn blocks(&self) -> usize {
+    pub(crate) fn blocks(&self) -> usize {
         self.columns.len()
     }
 

@@ -197,7 +197,7 @@ impl<const B: usize> Solver<B> {
     ///
     /// # Errors
     /// As [`Solver::new`].
-    pub fn update(
+    pub(crate) fn update(
         &mut self,
         matrix: &BlockMatrix<B>,
         constraints: &Constraints<B>,

@@ -50,7 +50,11 @@ fn torn(n: usize, cracks: Cracks, energy: f64, job: &Job) -> Result<[f64; 2], Tr
     hold(&mut model, 2, |p| near(p.z, 0.0));
     let end = model.mesh.node_sets["x1"].clone();
     let pull = end.iter().map(|&n| (n, 0.25 * DVec3::X)).collect();
-    model.loads.push(Load { name: "pull".into(), action: Action::Nodes(pull), history: vec![(0.0, 0.0)] });
+    model.loads.push(Load {
+        name: "pull".into(),
+        action: Action::Nodes(pull),
+        history: vec![(0.0, 0.0)],
+    });
     let sides = [
         node(&model.mesh, DVec3::new(weak + h, 0.0, 0.0))?,
         node(&model.mesh, DVec3::new(weak, 0.0, 0.0))?,

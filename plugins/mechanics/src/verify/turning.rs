@@ -62,8 +62,7 @@ pub(super) fn beam_column(job: &Job) -> Checks {
     let mut checks = Vec::new();
     for share in [0.5, 0.9] {
         let across = 1e-4 * STIFFNESS / LENGTH.powi(2);
-        let model =
-            strip(20, &[-share * critical * DVec3::X, across * DVec3::Y])?;
+        let model = strip(20, &[-share * critical * DVec3::X, across * DVec3::Y])?;
         let structure = System::new(&model)?;
         let history = solve_turned(&structure, job)?;
         let u = 0.5 * std::f64::consts::PI * share.sqrt();

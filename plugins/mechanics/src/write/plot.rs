@@ -27,12 +27,7 @@ const INKS: [&str; 4] = ["#7aa6c2", "#3f78a8", "#12406b", "#b0592a"];
 ///
 /// # Errors
 /// The file cannot be written.
-pub fn plot(
-    path: &Path,
-    title: &str,
-    axes: [&str; 2],
-    curves: &[Curve],
-) -> Result<(), WriteError> {
+pub fn plot(path: &Path, title: &str, axes: [&str; 2], curves: &[Curve]) -> Result<(), WriteError> {
     put(path, |out| out.write_all(svg(title, axes, curves).as_bytes()))
 }
 

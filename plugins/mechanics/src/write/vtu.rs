@@ -56,7 +56,7 @@ impl<'a> Grid<'a> {
 
     /// Bars between points of their own (embedded bars and tendons) or the mesh's.
     #[must_use]
-    pub fn rods(points: &'a [DVec3], rods: &[[u32; 2]]) -> Self {
+    pub(crate) fn rods(points: &'a [DVec3], rods: &[[u32; 2]]) -> Self {
         let mut grid = Self { points: points.into(), ..Self::default() };
         rods.iter().for_each(|nodes| grid.push(LINE, nodes, 0));
         grid
@@ -82,7 +82,7 @@ impl<'a> Grid<'a> {
 
     /// Cells.
     #[must_use]
-    pub fn cells(&self) -> usize {
+    pub(crate) fn cells(&self) -> usize {
         self.types.len()
     }
 
@@ -228,14 +228,14 @@ pub struct Series {
 impl Series {
     /// A series at `path` (`….pvd`); nothing is written yet.
     #[must_use]
-    pub fn new(path: impl Into<PathBuf>) -> Self {
+    pub(crate) fn new(path: impl Into<PathBuf>) -> Self {
         Self { path: path.into(), entries: Vec::new() }
     }
 
     /// Where the VTU file of a step belongs: beside the series, `NAME_0003.vtu`,
     /// `NAME_rods_0003.vtu`.
     #[must_use]
-    pub fn place(&self, part: &str, step: usize) -> PathBuf {
+    pub(crate) fn place(&self, part: &str, step: usize) -> PathBuf {
         let stem =
             self.path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
         let part = if part.is_empty() { String::new() } else { format!("_{part}") };
@@ -247,7 +247,7 @@ impl Series {
     ///
     /// # Errors
     /// The series cannot be written, or the time is not finite.
-    pub fn add(&mut self, time: f64, part: u32, file: &Path) -> Result<(), WriteError> {
+    pub(crate) fn add(&mut self, time: f64, part: u32, file: &Path) -> Result<(), WriteError> {
         if !time.is_finite() {
             return Err(WriteError {
                 path: self.path.clone(),

@@ -1,11 +1,7 @@
 //! One crack, whatever the shape of the bricks and wherever they look: work G_f A.
 
 use glam::DMat3;
-use intrados_mechanics::{
-    material::{concrete::Given, law::reach},
-    mesh::block,
-    model::{March, MarchSettings, System},
-};
+use intrados_mechanics::{material::law::reach, prelude::*};
 
 use super::*;
 
@@ -50,8 +46,7 @@ fn torn(n: usize, slim: f64, angle: f64) -> f64 {
     let row = [component(&crack[1], 1.0), component(&crack[0], -1.0)].concat();
     let structure = System::new(&model).unwrap();
     let settings = MarchSettings { tolerance: 1e-5, ..MarchSettings::default() };
-    let mut march =
-        March::new(&structure, structure.rest(0.0), raised(0, row), settings);
+    let mut march = March::new(&structure, structure.rest(0.0), raised(0, row), settings);
     let (mut work, mut opened, mut before) = (0.0, 0.0, [0.0; 2]);
     for k in 0..=100 {
         let opening = 1e-7 * f64::powf(5.0 * FRACTURE / STRENGTH / 1e-7, f64::from(k) / 100.0);

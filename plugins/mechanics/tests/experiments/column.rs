@@ -8,11 +8,7 @@
 //! The model knows no geometry of second order: the axial load's moment Nδ at the foot is taken off
 //! the force, Nδ/L. Bars end in the held foot, no strain penetrates into it.
 
-use intrados_mechanics::{
-    material::concrete::Given,
-    mesh::{block, divide},
-    model::Model,
-};
+use intrados_mechanics::prelude::*;
 
 use super::*;
 

@@ -2,11 +2,7 @@
 //! mm, loaded at its thirds, three No. 5 bars (600 mm²) at 210.8 mm from the top, no stirrups; f_c
 //! 36.2 MPa, f_y 333 MPa. Half of it is computed, on plates of 76 mm that the source does not give.
 
-use intrados_mechanics::{
-    material::concrete::Given,
-    mesh::{block, divide},
-    model::Model,
-};
+use intrados_mechanics::prelude::*;
 
 use super::*;
 
@@ -42,11 +38,8 @@ fn beam(h: f64) -> (Model, Vec<u32>, Vec<u32>) {
 fn janney_beam() {
     let data = measured("janney1956_beam.csv");
     let expected = peak(&data);
-    let mut curves = vec![Curve {
-        name: "Janney et al. (1956)".into(),
-        points: data.clone(),
-        marked: true,
-    }];
+    let mut curves =
+        vec![Curve { name: "Janney et al. (1956)".into(), points: data.clone(), marked: true }];
     for h in sizes(&[0.0508, 0.0381, 0.0305]) {
         println!("Janney's beam, bricks of {:.1} mm", 1e3 * h);
         let (model, _, middle) = beam(h);

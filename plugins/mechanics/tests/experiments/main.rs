@@ -48,16 +48,14 @@ use intrados_mechanics::{
     element::embed::embed,
     material::{
         bond::Bond,
-        concrete::{Code, Given, Properties, tensile_strength},
+        concrete::{Code, Properties, tensile_strength},
         damage::Measure,
-        law::{Cracks, Setting},
+        law::Cracks,
         steel::Bar,
     },
-    mesh::{Locator, Mesh},
-    model::{
-        Action, Body, Control, Drive, Load, March, MarchSettings, Matter, Model, Slipping, Steel, SteelKind,
-        System,
-    },
+    mesh::Locator,
+    model::{Slipping, Steel, SteelKind},
+    prelude::*,
     write::{Curve, plot},
 };
 use intrados_stage::Job;

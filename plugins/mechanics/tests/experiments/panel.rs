@@ -12,11 +12,7 @@
 //! explains it, and the displacement measured holds some of the rig's. The load is what is
 //! compared.
 
-use intrados_mechanics::{
-    material::concrete::{Given, fracture_energy},
-    mesh::{Mesh, block, divide},
-    model::Model,
-};
+use intrados_mechanics::{material::concrete::fracture_energy, prelude::*};
 
 use super::*;
 
@@ -70,11 +66,8 @@ fn winkler_l_panel() {
     let data: Vec<(f64, f64)> = data.into_iter().map(|(mm, newton)| (mm, newton / 1e3)).collect();
     let expected = peak(&data);
     let code = fracture_energy(31e6);
-    let mut curves = vec![Curve {
-        name: "Winkler (2001), series A".into(),
-        points: data.clone(),
-        marked: true,
-    }];
+    let mut curves =
+        vec![Curve { name: "Winkler (2001), series A".into(), points: data.clone(), marked: true }];
     let asked = std::env::var_os("EXPERIMENT_SIZES");
     for (h, gf) in sizes(&[0.025, 0.0167, 0.0125])
         .into_iter()

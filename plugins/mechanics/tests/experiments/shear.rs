@@ -3,11 +3,7 @@
 //! MPa, f_y 440 MPa (hardly reached). Half of it is computed, on plates of 150 mm that the source
 //! does not give.
 
-use intrados_mechanics::{
-    material::concrete::Given,
-    mesh::{block, divide},
-    model::Model,
-};
+use intrados_mechanics::prelude::*;
 
 use super::*;
 
@@ -41,11 +37,8 @@ fn beam(h: f64) -> (Model, Vec<u32>) {
 fn vecchio_shim_oa1() {
     let data = measured("vecchio_shim_OA1.csv");
     let expected = peak(&data);
-    let mut curves = vec![Curve {
-        name: "Vecchio and Shim (2004)".into(),
-        points: data.clone(),
-        marked: true,
-    }];
+    let mut curves =
+        vec![Curve { name: "Vecchio and Shim (2004)".into(), points: data.clone(), marked: true }];
     for h in sizes(&[0.092, 0.046, 0.0345]) {
         println!("OA1, bricks of {:.1} mm", 1e3 * h);
         let (model, middle) = beam(h);

@@ -7,15 +7,15 @@ use intrados_light::{Patch, patch::CoursePoint};
 use intrados_stage::{Cancelled, Job, random::Key};
 
 /// Kinds of damage that a pixel is labelled with.
-pub const MARKS: usize = 5;
+pub(crate) const MARKS: usize = 5;
 
 /// The brightest light that is kept, a tenth of all pixels being above 1.
 const BRIGHTEST: f32 = 16.0;
 
 /// Pixels along a side of a lesson.
-pub const SIDE: usize = 192;
+pub(crate) const SIDE: usize = 192;
 /// Walks a pixel: they draw alike, so that a lesson has no grain of its own.
-pub const SAMPLES: u64 = 10;
+pub(crate) const SAMPLES: u64 = 10;
 
 /// A patch with its labels.
 #[derive(Debug, Clone, PartialEq)]

@@ -328,7 +328,7 @@ fn spread(mut points: DMatrix<f64>) -> f64 {
 impl Located {
     /// Covariance of where a place is drawn, pixels²: by the pose alone. `None` where it is not.
     #[must_use]
-    pub fn pixel_covariance(&self, place: DVec3) -> Option<SMatrix<f64, 2, 2>> {
+    pub(crate) fn pixel_covariance(&self, place: DVec3) -> Option<SMatrix<f64, 2, 2>> {
         let (_, slopes) = self.pose.slopes(place)?;
         Some(slopes * self.covariance * slopes.transpose())
     }

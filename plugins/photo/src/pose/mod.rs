@@ -15,7 +15,7 @@ pub use locate::{Located, PoseError, Prior, locate};
 
 /// What of a pose is unknown, in this order: a turn about the camera's right, down and forward axes
 /// (rad, after the rotation), its position (m), the logarithm of its focal length, k1.
-pub const UNKNOWNS: usize = 8;
+pub(crate) const UNKNOWNS: usize = 8;
 /// Covariance of what is unknown of a pose.
 pub type Covariance = SMatrix<f64, UNKNOWNS, UNKNOWNS>;
 /// Slopes of a place in the picture by what is unknown of the pose.
@@ -93,7 +93,7 @@ impl Pose {
 
     /// Right, down and forward in the world.
     #[must_use]
-    pub fn axes(&self) -> [DVec3; 3] {
+    pub(crate) fn axes(&self) -> [DVec3; 3] {
         let axes = self.rotation.transpose();
         [axes.x_axis, axes.y_axis, axes.z_axis]
     }
@@ -122,7 +122,7 @@ impl Pose {
     /// Unit, in the world: what is drawn at a place of the picture lies there. `None` where the
     /// lens draws nothing.
     #[must_use]
-    pub fn ray(&self, [x, y]: [f64; 2]) -> Option<DVec3> {
+    pub(crate) fn ray(&self, [x, y]: [f64; 2]) -> Option<DVec3> {
         let [middle_x, middle_y] = self.middle();
         let drawn = [(x - middle_x) / self.focal_px, (y - middle_y) / self.focal_px];
         let [a, b] = self.lens.undistort(drawn, self.reach)?;

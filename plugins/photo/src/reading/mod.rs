@@ -27,7 +27,7 @@ use width::{Piece, SHOWS, pieces, scatter};
 pub use defect::{Crack, CrackPoint, Defect, Patch};
 
 /// Parts of the axis by which it is told what was seen.
-pub const PARTS: usize = 10;
+pub(crate) const PARTS: usize = 10;
 /// Between chord and axis: a crack runs along within 30°, across from 60° on (ours).
 const ALONG_DEG: f64 = 30.0;
 const ACROSS_DEG: f64 = 60.0;
@@ -123,7 +123,7 @@ fn as_it_looks(
 
 /// Millimetres of a face to one pixel of the photograph.
 #[must_use]
-pub fn own_scale(seen: &SeenFace) -> f64 {
+pub(crate) fn own_scale(seen: &SeenFace) -> f64 {
     let [around, along] = seen.middle.mm_px;
     (around * along).sqrt().max(0.02)
 }

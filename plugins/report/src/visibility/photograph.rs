@@ -117,7 +117,7 @@ struct Found {
 ///
 /// # Errors
 /// The job was cancelled.
-pub fn photograph(
+pub(crate) fn photograph(
     lit: &Arc<LitScene>,
     camera: &Camera,
     sensor: Sensor,

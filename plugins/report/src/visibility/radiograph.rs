@@ -30,9 +30,9 @@ use serde::Serialize;
 use super::SEEN_FROM;
 
 /// Directions over half a turn.
-pub const VIEWS: u32 = 12;
+pub(crate) const VIEWS: u32 = 12;
 /// Slices that the beam is cut for, as `scan` does.
-pub const SLICES: usize = 4;
+pub(crate) const SLICES: usize = 4;
 /// Height of the section, over the beam's.
 const HEIGHT: f64 = 1.2;
 /// A pixel is looked at by so many lines, one above the other: a crack is thinner.
@@ -67,7 +67,7 @@ pub struct RadiographedDefect {
 ///
 /// # Errors
 /// The job was cancelled.
-pub fn radiograph(
+pub(crate) fn radiograph(
     scene: &Scene,
     seed: u64,
     job: &Job,

@@ -43,7 +43,8 @@ pub(super) fn weight(
     }
     let place = match Sort::of(member.kind, member.frame) {
         Sort::Lying => {
-            let side_deg = Some(Face::Top.angle_deg(member.kind, member.frame)?);
+            let side = Face::Top.angle_deg(member.kind, member.frame);
+            let side_deg = Some(side.map_err(|why| why.to_string())?);
             let [from, to] = stretch(member, along)?;
             Place::Surface { from, to, side_deg }
         }

@@ -28,7 +28,7 @@ use tempfile::TempDir;
 
 pub use crate::file::evidence::{Along, Face, Finding, Kind};
 pub use listed::{Listed, listed};
-pub use raw::{Raw, VoxelType};
+pub use raw::{Raw, VoxelType, VoxelTypeError};
 
 use crate::{
     AxisRuns, LoadError, Member, Scene,

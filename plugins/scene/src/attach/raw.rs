@@ -24,6 +24,11 @@ pub struct Raw {
     pub big_endian: bool,
 }
 
+/// No voxel is of this type.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("is none of {}", TYPES.map(|t| t.1).join(", "))]
+pub struct VoxelTypeError;
+
 /// What a voxel is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum VoxelType {
@@ -66,12 +71,10 @@ impl VoxelType {
 }
 
 impl FromStr for VoxelType {
-    type Err = String;
+    type Err = VoxelTypeError;
 
-    fn from_str(text: &str) -> Result<Self, String> {
-        let known = || TYPES.map(|t| t.1).join(", ");
-        let found = TYPES.iter().find(|t| t.1 == text).map(|t| t.0);
-        found.ok_or_else(|| format!("is none of {}", known()))
+    fn from_str(text: &str) -> Result<Self, VoxelTypeError> {
+        TYPES.iter().find(|t| t.1 == text).map(|t| t.0).ok_or(VoxelTypeError)
     }
 }
 

@@ -193,7 +193,7 @@ pub(crate) fn unknown_members<'a>(
 impl Member {
     /// The ids of the members that this one becomes: its own, or those of a tunnel's lining and
     /// segments.
-    pub fn ids(&self) -> impl Iterator<Item = String> {
+    pub(crate) fn ids(&self) -> impl Iterator<Item = String> {
         let (own, rings, count) = match &self.body {
             Body::Tunnel { length_m, segments, inner_lining, .. } => match segments {
                 Some(s) => (inner_lining.is_some(), s.rings(*length_m), s.count),
@@ -250,7 +250,7 @@ impl Body {
 /// Whether a text names a class of Eurocode 2, and its characteristic cylinder strength, MPa:
 /// `C30/37` is 30.
 #[must_use]
-pub fn concrete_class(text: &str) -> Option<f32> {
+pub(crate) fn concrete_class(text: &str) -> Option<f32> {
     let (cylinder, cube) = text.strip_prefix('C')?.split_once('/')?;
     let (cylinder, cube) = (cylinder.parse::<u16>().ok()?, cube.parse::<u16>().ok()?);
     ((8..=120).contains(&cylinder) && (cylinder..=150).contains(&cube))

@@ -17,7 +17,7 @@ const CLASSES: [&str; 18] = [
 /// One line for everything that a scene probably does not mean. What is wrong for certain,
 /// [`check`] lists.
 #[must_use]
-pub fn doubts(scene: &SceneFile) -> Vec<String> {
+pub(crate) fn doubts(scene: &SceneFile) -> Vec<String> {
     let mut doubts = Vec::new();
     for member in &scene.members {
         if let Some(share) = member.body.steel_share().filter(|&share| share > MUCH_STEEL) {

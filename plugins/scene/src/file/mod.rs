@@ -32,9 +32,10 @@ use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 use crate::{problem::Problem, scene::Transport, structure::*};
 
+pub use check::check;
+pub(crate) use check::concrete_class;
 pub(crate) use check::unknown_members;
-pub use check::{check, concrete_class};
-pub use doubt::doubts;
+pub(crate) use doubt::doubts;
 pub(crate) use image::MAX_TEXELS;
 pub use member::{Assumed, Detail, Grading, Member, Slices};
 pub(crate) use obj::obj_groups;

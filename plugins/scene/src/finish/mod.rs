@@ -89,7 +89,7 @@ impl Finish {
 
     /// Factor of the material's colour that the concrete itself has, inside as outside.
     #[must_use]
-    pub fn tint(&self) -> Vec3 {
+    pub(crate) fn tint(&self) -> Vec3 {
         self.base.tint
     }
 

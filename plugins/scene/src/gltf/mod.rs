@@ -52,7 +52,8 @@ mod write;
 
 use std::sync::Arc;
 
-pub use import::{import, import_within};
+pub use import::import;
+pub(crate) use import::import_within;
 pub use problem::{GltfProblem, ImportError, Place, Severity};
 pub use validate::{validate, validate_within};
 pub use write::{write_glb, write_glb_with};

@@ -190,7 +190,7 @@ impl Electrode {
 
     /// What a potential measured with it would be against copper/copper sulphate, mV.
     #[must_use]
-    pub fn to_copper_sulphate(self, mv: f64) -> f64 {
+    pub(crate) fn to_copper_sulphate(self, mv: f64) -> f64 {
         mv + (self.against_hydrogen() - Self::CopperSulphate.against_hydrogen())
     }
 
@@ -244,7 +244,7 @@ pub mod usual {
 
     /// Rebound number: 2. Hammers of one design differ by 1 to 3 (ASTM C805, 5.3); the median of
     /// nine readings of one place adds little to that.
-    pub const REBOUND: f64 = 2.0;
+    pub(crate) const REBOUND: f64 = 2.0;
 
     /// Pulse velocity, m/s: 2 %. EN 12504-4 asks for the path's length and the time of travel to
     /// 1 % each; contact and moisture make it two (ours).
@@ -256,18 +256,18 @@ pub mod usual {
     /// Strength of a core, MPa: 5 %, of drilling, preparing and testing in one laboratory (ours;
     /// what one core says of its member scatters more, and is no error of the test).
     #[must_use]
-    pub fn core_mpa(mpa: f64) -> f64 {
+    pub(crate) fn core_mpa(mpa: f64) -> f64 {
         0.05 * mpa
     }
 
     /// Half-cell potential, mV: 10. By ASTM C876 two electrodes at one place should not differ by
     /// more than 20 mV.
-    pub const HALF_CELL_MV: f64 = 10.0;
+    pub(crate) const HALF_CELL_MV: f64 = 10.0;
 
     /// Chloride, % of the mass of cement: .03 or 10 % of the profile's mean, whichever is more, of
     /// taking the dust and analysing it (ours).
     #[must_use]
-    pub fn chloride_percent(mean: f64) -> f64 {
+    pub(crate) fn chloride_percent(mean: f64) -> f64 {
         f64::max(0.03, 0.1 * mean)
     }
 

@@ -36,7 +36,7 @@ pub use packet::Scratch;
 
 /// Triangles with a coordinate beyond this are never hit, nor are rays from there, m. Products of
 /// three stay finite.
-pub const LARGEST: f32 = 1e9;
+pub(crate) const LARGEST: f32 = 1e9;
 
 /// Rays whose direction has its largest component outside this range hit nothing.
 const LENGTHS: [f32; 2] = [1e-12, 1e12];

@@ -54,7 +54,7 @@ pub fn hit_point(corners: &[Vec3; 3], ray: &Ray) -> (Vec3, [f32; 2], Vec3) {
 /// compute them.
 #[inline]
 #[must_use]
-pub fn barycentric(corners: &[Vec3; 3], ray: &Ray) -> [f32; 2] {
+pub(crate) fn barycentric(corners: &[Vec3; 3], ray: &Ray) -> [f32; 2] {
     let (o, d) = (ray.origin, ray.direction);
     let [kx, ky, kz] = single::axes(d);
     let (sx, sy) = (-d[kx] / d[kz], -d[ky] / d[kz]);

@@ -43,7 +43,7 @@ impl MatrixField {
 
     /// A field that knows nothing.
     #[must_use]
-    pub fn nothing(problem: &MatrixProblem, side: Side) -> Self {
+    pub(crate) fn nothing(problem: &MatrixProblem, side: Side) -> Self {
         Self::new(problem, side, DVector::zeros(problem.len()))
     }
 

@@ -158,7 +158,7 @@ impl<'a> SteeredMatrix<'a> {
     /// # Panics
     /// If the linear system is singular.
     #[must_use]
-    pub fn expectation(&self) -> f64 {
+    pub(crate) fn expectation(&self) -> f64 {
         let n = self.problem.len();
         let way = |from: u32| -> Vec<f64> {
             let weighed =
@@ -257,7 +257,7 @@ impl<'a> SteeredMatrix<'a> {
 
     /// The exact relVar of one walk without defence, or infinity (theory §5, the oracle).
     #[must_use]
-    pub fn oracle(&self) -> f64 {
+    pub(crate) fn oracle(&self) -> f64 {
         let n = self.problem.len();
         let (far, field) = (self.problem.far(self.side), self.field.table());
         let next = |i: usize| {

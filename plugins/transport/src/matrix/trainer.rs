@@ -89,7 +89,7 @@ impl<'a> Trainer<'a> {
     /// proportion to what the walks of the side's last round promised there. NaN where they
     /// promised nothing.
     #[must_use]
-    pub fn residual(&self, side: Side) -> f64 {
+    pub(crate) fn residual(&self, side: Side) -> f64 {
         let (field, far) = (self.field(side), self.problem.far(side));
         let (mut squares, mut all) = (0.0, 0.0);
         for &MatrixSample { state, value, .. } in &self.photons[side as usize] {

@@ -1,37 +1,10 @@
 //! Where the axis of rotation falls on the detector. The result goes into
 //! [`Orbit::centre`](crate::volume::Orbit), which every method here heeds: nothing is resampled.
 
-use super::least_squares;
 use crate::{
     recon::ReconError,
     volume::{Beam, Orbit, Sinogram},
 };
-
-/// From parallel views of a whole specimen over any arc: the centre of mass of view θ lies at c + x
-/// cos θ + y sin θ, where (x, y) is that of the specimen (Helgason and Ludwig). Each view gives an
-/// equation, so noise averages out. Bins.
-///
-/// # Errors
-/// The beam is not parallel, or the views say nothing (too few, empty).
-pub fn axis_by_mass(sinogram: &Sinogram, row: usize) -> Result<f64, ReconError> {
-    let orbit = &sinogram.orbit;
-    if orbit.beam != Beam::Parallel {
-        return Err(ReconError::Bad(
-            "centres of mass tell the axis of parallel beams only; use the mirror".to_owned(),
-        ));
-    }
-    let lines = sinogram.row(row);
-    let views = lines.chunks(orbit.bins()).zip(&orbit.angles).filter_map(|(line, angle)| {
-        let (mass, moment) = line
-            .iter()
-            .enumerate()
-            .fold((0.0, 0.0), |(m, f), (i, p)| (m + f64::from(*p), f + i as f64 * f64::from(*p)));
-        (mass > 0.0).then(|| (vec![1.0, angle.cos(), angle.sin()], moment / mass))
-    });
-    let fit = least_squares(3, views)
-        .ok_or_else(|| ReconError::Bad("the views do not tell the axis".to_owned()))?;
-    Ok(fit[0])
-}
 
 /// From a full turn of any beam, whole specimen or not: each ray is measured again from the other
 /// side, and the axis is where both agree best. Looks within `reach` bins around the present

@@ -17,7 +17,8 @@ pub struct Panel {
 /// an unlucky or a starved pixel then says "at least so much", not infinity. Half a photon over the
 /// open beam's counts is a good floor.
 #[must_use]
-pub fn line_integrals(frames: &[f32], panel: &Panel, floor: f32) -> Vec<f32> {
+#[cfg(test)]
+pub(crate) fn line_integrals(frames: &[f32], panel: &Panel, floor: f32) -> Vec<f32> {
     // A pixel without gain transmits nothing, whatever it reads.
     let open: Vec<f32> = panel
         .flat

@@ -75,7 +75,7 @@ impl Linearisation {
     /// The monochromatic line integral of a polychromatic one; what is negative (noise in air) goes
     /// on with the first slope.
     #[must_use]
-    pub fn apply(&self, p: f32) -> f32 {
+    pub(crate) fn apply(&self, p: f32) -> f32 {
         let i = self.poly.partition_point(|knot| *knot <= p).clamp(1, KNOTS - 1);
         let [a, b] = [self.poly[i - 1], self.poly[i]];
         self.step * ((i - 1) as f32 + (p - a) / (b - a))
@@ -154,7 +154,7 @@ impl Polynomial {
 
     /// Value at one line integral.
     #[must_use]
-    pub fn apply(&self, p: f32) -> f32 {
+    pub(crate) fn apply(&self, p: f32) -> f32 {
         let p = f64::from(p);
         (self.0.iter().rev().fold(0.0, |sum, c| (sum + c) * p)) as f32
     }

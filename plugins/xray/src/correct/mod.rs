@@ -1,27 +1,24 @@
 //! Taking out of a scan what the specimen did not put in: detector, rings, beam hardening, scatter,
-//! metal, a misplaced axis.
+//! a misplaced axis. Metal is dealt with where scans are restored, since its rays need the physics.
 //!
 //! The order is that of the signal: counts − dark over flat, bad pixels, scatter (all in
-//! intensity), then −ln, rings, hardening, axis, metal. Stacks of views are `[view][row][bin]`; a
+//! intensity), then −ln, rings, hardening, axis. Stacks of views are `[view][row][bin]`; a
 //! sinogram of one slice is `[view][bin]`.
 
 mod centre;
 mod detector;
 mod hardening;
-mod metal;
 mod noise;
 mod rings;
 mod scatter;
 
-pub use centre::{axis_by_mass, axis_by_mirror};
-pub use detector::{Panel, bad_pixels, line_integrals, mend};
+pub use centre::axis_by_mirror;
+pub use detector::{Panel, bad_pixels, mend};
 pub use hardening::{Linearisation, Polynomial};
-pub use metal::{Metal, reduce_metal};
-pub use noise::{counts, poisson};
-pub use rings::{
-    Stripes, remove_rings, remove_stripes, remove_stripes_by_fit, remove_stripes_by_sorting,
-};
-pub use scatter::{Cleared, Estimate, Patch};
+pub use noise::counts;
+pub(crate) use noise::poisson;
+pub use rings::{Stripes, remove_stripes, remove_stripes_by_fit};
+pub use scatter::{Estimate, Patch};
 
 /// Median of what is there, 0 of nothing; `values` is reordered.
 fn median(values: &mut [f32]) -> f32 {

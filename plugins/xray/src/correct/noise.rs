@@ -8,7 +8,7 @@ const EXACT: f64 = 64.0;
 /// A Poisson number of mean `mean`: by inversion below 64, else rounded from the Cornish–Fisher
 /// expansion λ + √λ z + (z² − 1)/6, whose mean, variance and skewness are right to order 1/λ.
 #[must_use]
-pub fn poisson(mean: f64, key: Key, dimension: u32) -> f64 {
+pub(crate) fn poisson(mean: f64, key: Key, dimension: u32) -> f64 {
     if mean.is_nan() || mean <= 0.0 {
         return 0.0;
     }

@@ -5,10 +5,7 @@
 //! (2018), "Superior techniques for eliminating ring artifacts in X-ray micro-tomography", Opt.
 //! Express 26, 28396. All work on the sinogram of one slice, `[view][bin]` of line integrals.
 
-use std::f64::consts::TAU;
-
 use super::{bridge, least_squares, median, running_median};
-use crate::volume::Grid;
 
 /// How hard stripes are looked for; the defaults are Savu's.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -100,7 +97,7 @@ pub fn remove_stripes(sinogram: &mut [f32], bins: usize, stripes: Stripes) {
 /// Partial and full stripes of up to about half of `size` bins: in sorted columns a stripe stays a
 /// stripe and structure becomes smooth, so a running median across takes the one and leaves the
 /// other.
-pub fn remove_stripes_by_sorting(sinogram: &mut [f32], bins: usize, size: usize) {
+pub(crate) fn remove_stripes_by_sorting(sinogram: &mut [f32], bins: usize, size: usize) {
     let mut columns = Columns::of(sinogram, bins);
     let (sorted, orders) = columns.sorted();
     let smooth = sorted.smooth(size);
@@ -240,67 +237,4 @@ fn widened(found: Vec<bool>, by: usize) -> Vec<bool> {
     (0..found.len())
         .map(|i| found[i.saturating_sub(by)..(i + by + 1).min(found.len())].iter().any(|f| *f))
         .collect()
-}
-
-/// Rings in a finished slice, by polar coordinates about the axis: along each radius a running
-/// median over `size` voxels is taken off, and of what is left the median over an `arc` (rad) is
-/// the ring. Values beyond `limit` (structure, not ring) do not count.
-pub fn remove_rings(slice: &mut [f32], grid: &Grid, size: usize, arc: f64, limit: f32) {
-    let [nx, ny, _] = grid.size;
-    let pitch = grid.voxel[0].min(grid.voxel[1]);
-    let centre = [-grid.origin[0] / grid.voxel[0], -grid.origin[1] / grid.voxel[1]];
-    let far = (0..4)
-        .map(|c| grid.at(0, (c & 1) * (nx - 1)).hypot(grid.at(1, (c >> 1) * (ny - 1))))
-        .fold(0.0, f64::max);
-    let radii = (far / pitch).ceil() as usize + 1;
-    let turns = (TAU * radii as f64 / 2.0).ceil() as usize;
-    let at = |x: f64, y: f64| {
-        let (i, j) = (x.floor(), y.floor());
-        let inside = i >= 0.0 && j >= 0.0 && i + 1.0 < nx as f64 && j + 1.0 < ny as f64;
-        inside.then(|| {
-            let (k, p, q) = (j as usize * nx + i as usize, (x - i) as f32, (y - j) as f32);
-            (1.0 - q) * ((1.0 - p) * slice[k] + p * slice[k + 1])
-                + q * ((1.0 - p) * slice[k + nx] + p * slice[k + nx + 1])
-        })
-    };
-    // What is left of each radius, `[turn][radius]`.
-    let mut left = vec![f32::NAN; turns * radii];
-    for (turn, line) in left.chunks_mut(radii).enumerate() {
-        let (sin, cos) = (TAU * turn as f64 / turns as f64).sin_cos();
-        let place = |r: usize| {
-            (
-                centre[0] + r as f64 * pitch * cos / grid.voxel[0],
-                centre[1] + r as f64 * pitch * sin / grid.voxel[1],
-            )
-        };
-        let values: Vec<f32> = (0..radii).map_while(|r| at(place(r).0, place(r).1)).collect();
-        let smooth = running_median(&values, size);
-        for (out, (v, s)) in line.iter_mut().zip(values.iter().zip(&smooth)) {
-            *out = if (v - s).abs() <= limit { v - s } else { f32::NAN };
-        }
-    }
-    let half = ((arc / TAU * turns as f64) / 2.0).round() as isize;
-    let mut ring = vec![0.0; turns * radii];
-    let mut window = Vec::new();
-    // A ring changes slowly along the arc: every eighth of it is enough.
-    let stride = (half / 4).max(1) as usize;
-    for r in 0..radii {
-        for turn in (0..turns).step_by(stride) {
-            let around = (-half..=half)
-                .map(|k| left[(turn as isize + k).rem_euclid(turns as isize) as usize * radii + r]);
-            window.clear();
-            window.extend(around.filter(|v| v.is_finite()));
-            let value = median(&mut window);
-            (turn..(turn + stride).min(turns)).for_each(|t| ring[t * radii + r] = value);
-        }
-    }
-    for (i, v) in slice.iter_mut().enumerate() {
-        let (x, y) = (grid.at(0, i % nx), grid.at(1, i / nx));
-        let r = x.hypot(y) / pitch;
-        let turn = (y.atan2(x).rem_euclid(TAU) / TAU * turns as f64).round() as usize % turns;
-        let (k, share) = (r as usize, (r - r.floor()) as f32);
-        if k + 1 < radii {
-            *v -= ring[turn * radii + k] * (1.0 - share) + ring[turn * radii + k + 1] * share;
-        }
-    }
 }

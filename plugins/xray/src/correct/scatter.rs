@@ -1,8 +1,8 @@
-//! Scatter subtraction, with error bars.
+//! Scatter over a scan, with error bars.
 //!
 //! Scatter is smooth, so it is estimated (by Monte Carlo) at a few views and on a coarse grid of
-//! the detector, and interpolated. It is known with a standard error, and so is what is left after
-//! it has been taken off: both go on as variances. All intensities are in units of the open beam.
+//! the detector, and interpolated, and so is its standard error. All intensities are in units of
+//! the open beam.
 
 use std::f64::consts::TAU;
 
@@ -23,17 +23,6 @@ pub struct Estimate {
     /// Coarse rows and bins; each patch covers the whole detector with patches of equal size.
     pub size: [usize; 2],
     patches: Vec<Patch>,
-}
-
-/// Line integrals without scatter.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Cleared {
-    /// −ln of what is left.
-    pub line_integrals: Vec<f32>,
-    /// Their variance.
-    pub variance: Vec<f32>,
-    /// Share of rays where less was left than its standard error, so that the floor spoke.
-    pub floored: f64,
 }
 
 impl Estimate {
@@ -104,46 +93,5 @@ impl Estimate {
             }
         }
         (values, variances)
-    }
-
-    /// Takes the scatter off stacked frames (`intensity` over the open beam, with its `variance`),
-    /// `[view][row][bin]`.
-    ///
-    /// Where less is left than σ, its own standard error, the logarithm would be of noise, or of a
-    /// negative number. There σ·exp(rest/σ − 1) takes its place, which goes on from the line with
-    /// the same slope and stays above 0: such rays say "at least about this much". What is left has
-    /// the variance (var I + var S) / rest².
-    #[must_use]
-    pub fn subtract(
-        &self,
-        intensity: &[f32],
-        variance: &[f32],
-        angles: &[f64],
-        [rows, bins]: [usize; 2],
-    ) -> Cleared {
-        let mut cleared = Cleared {
-            line_integrals: Vec::with_capacity(intensity.len()),
-            variance: Vec::with_capacity(intensity.len()),
-            floored: 0.0,
-        };
-        let frame = (rows * bins).max(1);
-        let mut floored = 0_usize;
-        for ((&angle, intensity), variance) in
-            angles.iter().zip(intensity.chunks(frame)).zip(variance.chunks(frame))
-        {
-            let (scatter, error) = self.view(angle, [rows, bins]);
-            for ((i, v), (s, e)) in intensity.iter().zip(variance).zip(scatter.iter().zip(&error)) {
-                let sigma = (v + e).sqrt().max(1e-12);
-                let mut rest = i - s;
-                if rest < sigma {
-                    rest = sigma * (rest / sigma - 1.0).max(-20.0).exp();
-                    floored += 1;
-                }
-                cleared.line_integrals.push(-rest.ln());
-                cleared.variance.push((sigma / rest).powi(2));
-            }
-        }
-        cleared.floored = floored as f64 / intensity.len().max(1) as f64;
-        cleared
     }
 }

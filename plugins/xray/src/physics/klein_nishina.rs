@@ -7,7 +7,7 @@ use intrados_stage::random::Draw;
 use std::f64::consts::{PI, TAU};
 
 /// m_e c², keV.
-pub const ELECTRON: f64 = 510.998_95;
+pub(crate) const ELECTRON: f64 = 510.998_95;
 
 /// E′/E for the cosine `c`.
 #[inline]
@@ -20,7 +20,7 @@ pub fn ratio(kev: f64, c: f64) -> f64 {
 /// enough.
 #[inline]
 #[must_use]
-pub fn energy_before(kev: f64, c: f64) -> f64 {
+pub(crate) fn energy_before(kev: f64, c: f64) -> f64 {
     let k = 1.0 - kev / ELECTRON * (1.0 - c);
     if k > 0.0 { kev / k } else { f64::INFINITY }
 }
@@ -45,27 +45,6 @@ pub fn total(kev: f64) -> f64 {
     2.0 * TAU
         * ((1.0 + a) / (a * a) * (2.0 * (1.0 + a) / b - l / a) + l / (2.0 * a)
             - (1.0 + 3.0 * a) / (b * b))
-}
-
-/// Density of a direction, per sr.
-#[derive(Debug, Clone, Copy)]
-pub struct KleinNishina {
-    kev: f64,
-    total: f64,
-}
-
-impl KleinNishina {
-    /// For photons of `kev`.
-    #[must_use]
-    pub fn new(kev: f64) -> Self {
-        Self { kev, total: total(kev) }
-    }
-
-    /// Per sr.
-    #[must_use]
-    pub fn pdf(&self, c: f64) -> f64 {
-        shape(self.kev, c) / self.total
-    }
 }
 
 /// The two laws in k between `low` and 1 that both ways are drawn from: 1/k and k, with their
@@ -193,8 +172,9 @@ mod tests {
                 let mut draw = Draw::new(Key::new(1, i));
                 Some([Forward::new(kev).sample(&mut draw), draw.unit()])
             };
-            let density = KleinNishina::new(kev);
-            let chi = rectangle(GRID, 1_000_000, draw, |[c, _]| TAU * density.pdf(c));
+            // Density of a direction, per sr, all around the axis.
+            let density = |c| TAU * shape(kev, c) / total(kev);
+            let chi = rectangle(GRID, 1_000_000, draw, |[c, _]| density(c));
             assert!(chi.passes(6), "{kev}: {chi:?}");
             let backward = Backward::new(kev, 460.0);
             let back = |i| {

@@ -11,7 +11,7 @@ use super::{
 };
 
 /// Photons below this are absorbed, keV: they come no further than 0.3 mm in concrete.
-pub const CUT: f64 = 8.0;
+pub(crate) const CUT: f64 = 8.0;
 /// Highest energy of the tables, keV.
 const TOP: f64 = 500.0;
 /// Step of the tables, keV.
@@ -20,7 +20,7 @@ const STEP: f64 = 0.25;
 /// x = sin(θ/2)/λ in 1/Å; hc = 12.398 keV·Å.
 #[inline]
 #[must_use]
-pub fn transfer(kev: f64, c: f64) -> f64 {
+pub(crate) fn transfer(kev: f64, c: f64) -> f64 {
     kev / 12.398_42 * (0.5 * (1.0 - c)).max(0.0).sqrt()
 }
 

@@ -12,11 +12,12 @@ mod rayleigh;
 mod spectrum;
 mod table;
 
-pub use klein_nishina::{
-    Backward, ELECTRON, Forward, KleinNishina, energy_before, ratio, shape,
-    total as klein_nishina_total,
-};
-pub use matter::{CUT, Cross, Matter, Model, transfer};
+pub(crate) use klein_nishina::ELECTRON;
+pub(crate) use klein_nishina::energy_before;
+pub use klein_nishina::{Backward, Forward, ratio, shape, total as klein_nishina_total};
+pub(crate) use matter::CUT;
+pub(crate) use matter::transfer;
+pub use matter::{Cross, Matter, Model};
 pub use rayleigh::FormFactor;
 pub use spectrum::{Spectrum, Tubes};
 pub use table::{Attenuation, Forms, Library, Material};

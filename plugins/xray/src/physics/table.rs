@@ -169,12 +169,6 @@ impl Library {
             }
         })
     }
-
-    /// All of them.
-    #[must_use]
-    pub fn materials(&self) -> &[Material] {
-        &self.materials
-    }
 }
 
 impl Material {

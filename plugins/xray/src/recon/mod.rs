@@ -27,7 +27,7 @@ use crate::volume::{Beam, Grid, Orbit, Sinogram, Volume};
 pub use filter::Window;
 pub use iterate::{Iteration, cgls, sirt};
 pub use joseph::Projector;
-pub use quality::{nrmse, nrmse_in, psnr};
+pub use quality::{nrmse, nrmse_in};
 pub use slab::{bytes, rows, slab};
 
 /// Why nothing was reconstructed.

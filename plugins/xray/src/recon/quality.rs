@@ -30,9 +30,3 @@ pub fn nrmse(image: &[f32], truth: &[f32], grid: &Grid, share: f64) -> f64 {
         x.hypot(y) < radius
     })
 }
-
-/// Peak signal-to-noise ratio, dB: −20 log₁₀ nRMSE over all voxels.
-#[must_use]
-pub fn psnr(image: &[f32], truth: &[f32]) -> f64 {
-    -20.0 * nrmse_in(image, truth, |_| true).log10()
-}

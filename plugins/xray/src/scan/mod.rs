@@ -124,7 +124,7 @@ impl Target {
     ///
     /// # Errors
     /// [`ScanError`].
-    pub fn grown(
+    pub(crate) fn grown(
         recipe: &Recipe,
         place: Option<Place>,
         protocol: &Protocol,

@@ -122,7 +122,7 @@ const LEVELS: [(u32, bool, bool, f64); 13] = [
 impl PhotonField {
     /// A first guess: what comes straight to the target, and rather forward.
     #[must_use]
-    pub fn guess(problem: &PhotonProblem, domain: &Domain, side: Side) -> Self {
+    pub(crate) fn guess(problem: &PhotonProblem, domain: &Domain, side: Side) -> Self {
         let target = targets(problem.scanner)[side as usize];
         let depths = |cell: usize| -> Vec<f64> {
             let from = domain.lattice.centre(cell);

@@ -30,6 +30,27 @@ pub enum Face {
     Invert,
 }
 
+/// Why a face has no angle.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum FaceError {
+    /// The member has faces of other names.
+    #[error(
+        "{} is no face of {of}: choose {}, {}, {} or {}, or give angle_deg",
+        face.name(), has[0].name(), has[1].name(), has[2].name(), has[3].name()
+    )]
+    NoFace {
+        /// The one that was asked for.
+        face: Face,
+        /// What the member is, for people.
+        of: &'static str,
+        /// Those that it has.
+        has: [Face; 4],
+    },
+    /// A shaft has no crown.
+    #[error("the member's axis is upright, so that it has no crown: give angle_deg")]
+    NoCrown,
+}
+
 /// How names of faces are given.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Sort {
@@ -47,6 +68,15 @@ impl Sort {
             MemberKind::Lining | MemberKind::Segment | MemberKind::Pipe => Self::Tunnel,
             _ if frame.axis.normalize_or_zero().y.abs() > UPRIGHT => Self::Upright,
             _ => Self::Lying,
+        }
+    }
+
+    /// What has them, for people.
+    fn what(self) -> &'static str {
+        match self {
+            Self::Upright => "what stands",
+            Self::Lying => "what lies",
+            Self::Tunnel => "a tunnel",
         }
     }
 
@@ -106,8 +136,8 @@ impl Face {
     /// Its angle about the axis of a member, degrees, 0 to 360.
     ///
     /// # Errors
-    /// The member has no face of this name: one sentence that names those that it has.
-    pub fn angle_deg(self, kind: MemberKind, frame: Frame) -> Result<f32, String> {
+    /// The member has no face of this name.
+    pub fn angle_deg(self, kind: MemberKind, frame: Frame) -> Result<f32, FaceError> {
         let sort = Sort::of(kind, frame);
         let axis = frame.axis.normalize_or_zero();
         let up = (Vec3::Y - Vec3::Y.dot(axis) * axis).normalize_or_zero();
@@ -118,21 +148,10 @@ impl Face {
             Sort::Lying | Sort::Tunnel => (up, axis.cross(up)),
         };
         let Some(turn) = sort.faces().iter().position(|face| *face == self) else {
-            let [a, b, c, d] = sort.faces().map(Self::name);
-            let what = match sort {
-                Sort::Upright => "what stands",
-                Sort::Lying => "what lies",
-                Sort::Tunnel => "a tunnel",
-            };
-            return Err(format!(
-                "{} is no face of {what}: choose {a}, {b}, {c} or {d}, or give angle_deg",
-                self.name()
-            ));
+            return Err(FaceError::NoFace { face: self, of: sort.what(), has: sort.faces() });
         };
         if first == Vec3::ZERO {
-            return Err(
-                "the member's axis is upright, so that it has no crown: give angle_deg".into()
-            );
+            return Err(FaceError::NoCrown);
         }
         let way = [first, next, -first, -next][turn];
         let degrees = way.dot(frame.ninety()).atan2(way.dot(frame.zero)).to_degrees();
@@ -178,10 +197,10 @@ mod tests {
             (beam, Face::Left, "Bottom"),
             (tunnel, Face::Top, "Invert"),
         ] {
-            let message = face.angle_deg(kind, frame).unwrap_err();
+            let message = face.angle_deg(kind, frame).unwrap_err().to_string();
             assert!(message.contains(right), "{message}");
         }
         let shaft = frame(20.0 * Vec3::Y, Vec3::X);
-        assert!(Face::Crown.angle_deg(MemberKind::Lining, shaft).is_err());
+        assert_eq!(Face::Crown.angle_deg(MemberKind::Lining, shaft), Err(FaceError::NoCrown));
     }
 }

@@ -22,8 +22,8 @@ use serde::{Deserialize, Serialize};
 
 pub use along::Along;
 pub use check::check;
-pub use face::Face;
 pub(crate) use face::Sort;
+pub use face::{Face, FaceError};
 pub(crate) use place::{no_member, place};
 pub(crate) use table::{RawReading, read as read_table};
 
@@ -39,7 +39,7 @@ use crate::{
 pub const SCHEMA: &str = "intrados.evidence/1";
 
 /// The name under which evidence is found beside a scene.
-pub const NAME: &str = "evidence.ron";
+pub(crate) const NAME: &str = "evidence.ron";
 
 /// Most rows of all tables of a file.
 const MAX_ROWS: usize = 200_000;

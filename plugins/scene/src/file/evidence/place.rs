@@ -238,7 +238,9 @@ impl<'a> Placing<'a> {
         let member = &self.scene.members[*index];
         let angle_deg = match seat.face.map(|face| face.angle_deg(member.kind, member.frame)) {
             Some(Ok(angle)) => Some(angle),
-            Some(Err(why)) => return self.error(reading.field("face"), "FACE", why),
+            Some(Err(why)) => {
+                return self.error(reading.field("face"), "FACE", why.to_string());
+            }
             None => seat.angle_deg.map(|angle| angle.rem_euclid(360.0)),
         };
         if let Some(why) = seat.depth_mm.and_then(|mm| too_deep(member, angle_deg, 1e-3 * mm)) {
@@ -447,7 +449,8 @@ impl<'a> Placing<'a> {
     ) -> Result<Spot, (&'static str, &'static str, String)> {
         let member = &self.scene.members[index];
         let of_face = |face: Face| {
-            face.angle_deg(member.kind, member.frame).map_err(|why| ("face", "FACE", why))
+            face.angle_deg(member.kind, member.frame)
+                .map_err(|why| ("face", "FACE", why.to_string()))
         };
         let angle_deg = match record.face {
             Some(face) => Some(of_face(face)?),

@@ -71,7 +71,7 @@ pub fn import(path: &Path, job: &Job) -> Result<Model, ImportError> {
 ///
 /// # Errors
 /// As [`import`].
-pub fn import_within(path: &Path, access: &Access, job: &Job) -> Result<Model, ImportError> {
+pub(crate) fn import_within(path: &Path, access: &Access, job: &Job) -> Result<Model, ImportError> {
     let mut problems = Vec::new();
     let document = Document::open(path, access, job, &mut problems)?;
     if let Some(document) = &document {

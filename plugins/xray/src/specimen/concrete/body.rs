@@ -78,7 +78,7 @@ impl Body {
 
     /// The same, scaled to another diameter.
     #[must_use]
-    pub fn scaled(mut self, diameter: f64) -> Self {
+    pub(crate) fn scaled(mut self, diameter: f64) -> Self {
         let by = diameter / self.diameter;
         (self.unit, self.axes) = (self.unit * by.recip(), self.axes * by);
         self.half *= by;
@@ -137,7 +137,7 @@ impl Body {
 
     /// Where the line through `p` along `way` is within: distances from `p`.
     #[must_use]
-    pub fn crossed(&self, p: DVec3, way: DVec3) -> Option<[f64; 2]> {
+    pub(crate) fn crossed(&self, p: DVec3, way: DVec3) -> Option<[f64; 2]> {
         let (q, w) = (self.unit * (p - self.centre), self.unit * way);
         let (a, b, c) = (w.length_squared(), q.dot(w), q.length_squared() - 1.0);
         let root = b * b - a * c;

@@ -69,7 +69,7 @@ impl Relief {
     /// Root mean square difference of the heights of two points `r` apart, over all phases and
     /// directions of r.
     #[must_use]
-    pub fn difference(&self, r: f64) -> f64 {
+    pub(crate) fn difference(&self, r: f64) -> f64 {
         let n = 24;
         let mean = |k: DVec2| {
             (0..n)

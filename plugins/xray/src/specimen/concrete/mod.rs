@@ -19,7 +19,7 @@ mod told;
 pub use body::{Body, Kind};
 pub use crack::{Path, Relief};
 pub use member::{Opaque, Place, Subject, of_member, wander};
-pub use paint::{CRACK, FULL, Label, OUTSIDE, Painted, substances};
+pub use paint::{FULL, Label, OUTSIDE, Painted, substances};
 pub(crate) use paint::{RUST, STEEL};
 pub use recipe::{Air, Bar, Crack, Honeycomb, Outline, Recipe, Rock, Spall};
 

@@ -17,7 +17,7 @@ use crate::{
 pub const FULL: u8 = 128;
 /// Of 64 points, from this many in a crack on a voxel is labelled one: cracks are mostly thinner
 /// than voxels.
-pub const CRACK: u32 = 6;
+pub(crate) const CRACK: u32 = 6;
 /// The label around the specimen.
 pub const OUTSIDE: u8 = Label::Outside as u8;
 /// Hardened cement paste, kg/m³.

@@ -206,7 +206,7 @@ pub struct Recipe {
 impl Recipe {
     /// Sound concrete of quartz gravel up to 16 mm, without pores and steel.
     #[must_use]
-    pub fn sound(outline: Outline, height: f64, finest: f64, seed: u64) -> Self {
+    pub(crate) fn sound(outline: Outline, height: f64, finest: f64, seed: u64) -> Self {
         Self {
             outline,
             height,
@@ -232,7 +232,7 @@ impl Recipe {
 
     /// Edge of the cells on which bodies are placed.
     #[must_use]
-    pub fn cell(&self) -> f64 {
+    pub(crate) fn cell(&self) -> f64 {
         let half = self.outline.half();
         (0.5 * self.finest).max((4.0 * half.x * half.y * self.height / CELLS).cbrt())
     }
