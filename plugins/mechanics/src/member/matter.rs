@@ -163,6 +163,7 @@ pub(crate) fn properties(scene: &Scene, name: &str) -> Result<Properties, Error>
         Some(c) => Given {
             code: Code::Ec2,
             fck: Some(f64::from(c.fck_mpa) * 1e6),
+            fcm: c.fcm_mpa.map(|v| f64::from(v) * 1e6),
             fctm: c.fctm_mpa.map(|v| f64::from(v) * 1e6),
             modulus: c.ecm_gpa.map(|v| f64::from(v) * 1e9),
             poisson: c.poisson.map(f64::from),

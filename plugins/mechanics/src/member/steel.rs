@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use glam::DVec3;
 use intrados_scene::{
     Part, SteelLine,
-    structure::{self, Prestress, StrandGrade},
+    structure::{self, Hold, Place, Prestress, StrandGrade},
 };
 
 use super::{Draft, MemberError};
@@ -89,7 +89,10 @@ impl Draft<'_> {
         let (id, name) = (self.id(), line.name.clone());
         // Round members are meshed by chords: what lies outside of them by less than a hair's
         // breadth is drawn in.
-        let points: Vec<DVec3> = line.line.iter().map(|p| self.inward(p.as_dvec3())).collect();
+        let mut points: Vec<DVec3> = line.line.iter().map(|p| self.inward(p.as_dvec3())).collect();
+        if line.part == Part::Bar && self.member.body.is_some() {
+            self.go_on(&mut points);
+        }
         let find = |p: DVec3| locator.locate(p).map(|host| (host.hex as usize, host.natural));
         let embedded = embed(&points, find, corners);
         let pieces = embedded.map_err(|source| MemberError::Embed {
@@ -252,6 +255,40 @@ impl Draft<'_> {
         line.iter().zip(drawn).map(moved).collect()
     }
 
+    /// A bar that ends near a face which is held along the axis runs into that: into a footing that
+    /// it starts from, or into the other half of a symmetric member.
+    fn go_on(&self, points: &mut [DVec3]) {
+        let along = self.axes.unit[2];
+        let held = |place: &Place| {
+            let of_member =
+                |s: &&structure::Support| s.member == self.member.id && s.place == *place;
+            self.scene.structure.supports.iter().filter(of_member).any(|s| match s.hold {
+                Hold::Fixed => true,
+                Hold::Directions { x, y, z } => {
+                    let held = [x, y, z].map(|held| f64::from(u8::from(held)));
+                    along.abs().dot(DVec3::from_array(held)) > 0.99
+                }
+                Hold::Springs { .. } => false,
+            })
+        };
+        let length = self.axes.length;
+        for (place, face) in [(Place::Start, 0.0), (Place::End, length)] {
+            let near =
+                |p: &&mut DVec3| (self.axes.local(**p).z - face).abs() < REACHES.min(0.1 * length);
+            if !held(&place) {
+                continue;
+            }
+            let ends = [0, points.len() - 1];
+            for end in ends {
+                if let Some(point) = points.get_mut(end).filter(near) {
+                    let mut local = self.axes.local(*point);
+                    local.z = face.clamp(1e-6 * length, (1.0 - 1e-6) * length);
+                    *point = self.axes.world(local);
+                }
+            }
+        }
+    }
+
     /// The point, drawn towards the axis a little.
     fn inward(&self, p: DVec3) -> DVec3 {
         let mut local = self.axes.local(p);
@@ -260,6 +297,10 @@ impl Draft<'_> {
         self.axes.world(local)
     }
 }
+
+/// A bar that ends within this distance of a held face runs into what holds it, m: covers are no
+/// deeper.
+const REACHES: f64 = 0.1;
 
 fn length(line: &[DVec3]) -> f64 {
     line.windows(2).map(|w| w[0].distance(w[1])).sum()

@@ -35,6 +35,7 @@ mod band;
 mod column;
 mod flexure;
 mod panel;
+mod series;
 mod shear;
 
 use std::{

@@ -597,6 +597,9 @@ impl Checker<'_> {
 
     fn concrete(&mut self, k: &Concrete) {
         self.within("fck_mpa", k.fck_mpa, 1.0, 250.0);
+        if let Some(mean) = k.fcm_mpa {
+            self.within("fcm_mpa", mean, k.fck_mpa, 250.0);
+        }
         let optional = [
             ("fctm_mpa", k.fctm_mpa, 0.01, 50.0),
             ("ecm_gpa", k.ecm_gpa, 0.1, 200.0),
@@ -772,8 +775,13 @@ impl Checker<'_> {
                         }
                         diameter_mm
                     }
-                    Bars::Row { side_deg, count, diameter_mm } => {
+                    Bars::Row { side_deg, count, diameter_mm, inset_mm, from, to, f_y_mpa } => {
                         c.count("count", count, 1, 1000);
+                        c.within("inset_mm", inset_mm, 0.0, 500.0 * least_m);
+                        c.grade(&r.steel, f_y_mpa);
+                        if !(0.0 <= from && from < to && to <= 1.0) {
+                            c.error("from", "RANGE", "bars run from a place to a later one, both from 0 to 1");
+                        }
                         if ![0.0, 90.0, 180.0, 270.0].contains(&side_deg) || round {
                             c.error("side_deg", "RANGE", "a row lies at side 0, 90, 180 or 270 of a section with corners");
                         }

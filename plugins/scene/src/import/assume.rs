@@ -129,7 +129,7 @@ pub(super) fn reinforcement(m: &Measures, fck: f64, cover_mm: f32) -> Option<Rei
         steel: STEEL.into(),
         f_y_mpa: None,
         bars,
-        stirrups: Some(Stirrups { diameter_mm: diameter, spacing_mm: spacing }),
+        stirrups: Some(Stirrups { diameter_mm: diameter, spacing_mm: spacing, f_y_mpa: None }),
         bond: Default::default(),
     })
 }
@@ -153,7 +153,7 @@ fn wall(m: &Measures, cover: f64) -> Laid {
         if depth <= width { (depth, width, [0.0, 180.0]) } else { (width, depth, [90.0, 270.0]) };
     let apart = (3.0 * thick).min(0.4);
     let (count, diameter_mm) = bars(0.001 * m.area, wide - 2.0 * cover, apart, 8.0);
-    let rows = sides.map(|side_deg| Bars::Row { side_deg, count, diameter_mm });
+    let rows = sides.map(|side_deg| Bars::row(side_deg, count, diameter_mm));
     // Level bars: a hoop has one at each face.
     let per_metre = 0.0005 * thick;
     (rows.to_vec(), hoops(per_metre, 0.4))
@@ -169,7 +169,7 @@ fn flat(m: &Measures, cover: f64, tension: f64, fck: f64, fyk: f64) -> Laid {
     // 9.8.2.1: 8 mm in footings.
     let least = if is_beam { 10.0 } else { 8.0 };
     let (count, diameter_mm) = bars(area, width - 2.0 * cover, apart, least);
-    let rows = [180.0, 0.0].map(|side_deg| Bars::Row { side_deg, count, diameter_mm }).to_vec();
+    let rows = [180.0, 0.0].map(|side_deg| Bars::row(side_deg, count, diameter_mm)).to_vec();
     let across = if is_beam {
         // Two legs of each link.
         0.5 * 0.08 * fck.sqrt() / fyk * width

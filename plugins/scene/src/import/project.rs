@@ -379,7 +379,7 @@ fn reinforcement(r: &Reinforcement) -> String {
             Bars::Around { count, diameter_mm } => {
                 format!("Around(count: {count}, diameter_mm: {diameter_mm})")
             }
-            Bars::Row { side_deg, count, diameter_mm } => {
+            Bars::Row { side_deg, count, diameter_mm, .. } => {
                 format!("Row(side_deg: {side_deg}, count: {count}, diameter_mm: {diameter_mm})")
             }
         })

@@ -196,10 +196,8 @@ mod tests {
             cover_mm: 40.0,
             steel: "B500B".into(),
             f_y_mpa: None,
-            bars: [180.0, 0.0]
-                .map(|side_deg| Bars::Row { side_deg, count: 3, diameter_mm: 20.0 })
-                .to_vec(),
-            stirrups: Some(Stirrups { diameter_mm: 10.0, spacing_mm: 200.0 }),
+            bars: [180.0, 0.0].map(|side_deg| Bars::row(side_deg, 3, 20.0)).to_vec(),
+            stirrups: Some(Stirrups { diameter_mm: 10.0, spacing_mm: 200.0, f_y_mpa: None }),
             bond: Default::default(),
         }
     }

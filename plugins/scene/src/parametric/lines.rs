@@ -80,15 +80,15 @@ fn prism(
     let mut lines = Vec::new();
     if let Some(r) = reinforcement {
         let (cover, grade) = ((r.cover_mm / 1000.0).min(0.4 * length), r.grade());
-        lines.extend(bars(outline, r).into_iter().enumerate().map(|(i, (p, diameter))| {
-            SteelLine {
-                name: format!("bar {}", i + 1),
-                part: Part::Bar,
-                diameter,
-                line: vec![p.extend(cover), p.extend(length - cover)],
-                grade,
-                prestress: None,
-            }
+        let of =
+            |f_y_mpa: Option<f32>| grade.map(|g| if f_y_mpa.is_some() { g.at(f_y_mpa) } else { g });
+        lines.extend(bars(outline, r).into_iter().enumerate().map(|(i, bar)| SteelLine {
+            name: format!("bar {}", i + 1),
+            part: Part::Bar,
+            diameter: bar.diameter,
+            line: bar.ends(length, cover).map(|z| bar.at.extend(z)).to_vec(),
+            grade: of(bar.f_y_mpa),
+            prestress: None,
         }));
         if let Some(s) = &r.stirrups {
             let shape = closed(stirrup(outline, r.cover_mm / 1000.0, s.diameter_mm / 1000.0));
@@ -97,7 +97,7 @@ fn prism(
                 part: Part::Stirrup,
                 diameter: s.diameter_mm / 1000.0,
                 line: shape.iter().map(|p| *p + Vec3::Z * z).collect(),
-                grade,
+                grade: of(s.f_y_mpa),
                 prestress: None,
             }));
         }

@@ -297,22 +297,19 @@ impl Builder<'_> {
         if let Some(r) = reinforcement {
             self.job.step(0, 1)?;
             let cover = (r.cover_mm / 1000.0).min(0.4 * length);
-            let mut last: Option<(f32, usize)> = None;
-            for (i, (p, diameter)) in steel::bars(outline, r).into_iter().enumerate() {
-                // Bars of one diameter share a mesh.
+            let mut last: Option<(f32, [f32; 2], usize)> = None;
+            for (i, bar) in steel::bars(outline, r).into_iter().enumerate() {
+                let (diameter, ends) = (bar.diameter, bar.ends(length, cover));
+                // Bars of one diameter and length share a mesh.
                 let mesh = match last {
-                    Some((d, mesh)) if d == diameter => mesh,
-                    _ => self.mesh(solid::tube(
-                        &[Vec3::Z * cover, Vec3::Z * (length - cover)],
-                        diameter,
-                        false,
-                    )),
+                    Some((d, e, mesh)) if d == diameter && e == ends => mesh,
+                    _ => self.mesh(solid::tube(&ends.map(|z| Vec3::Z * z), diameter, false)),
                 };
-                last = Some((diameter, mesh));
+                last = Some((diameter, ends, mesh));
                 self.place(
                     format!("{id} bar {}", i + 1),
                     mesh,
-                    Mat4::from_translation(p.extend(0.0)),
+                    Mat4::from_translation(bar.at.extend(0.0)),
                     member,
                     Part::Bar,
                 );

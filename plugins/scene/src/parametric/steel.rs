@@ -18,13 +18,44 @@ pub(crate) enum Outline {
     Girder { top: f32, bottom: f32, depth: f32 },
 }
 
-/// Centres of the longitudinal bars with their diameters, m.
-pub(crate) fn bars(outline: Outline, r: &Reinforcement) -> Vec<(Vec2, f32)> {
+/// A longitudinal bar.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Laid {
+    /// Its centre.
+    pub(crate) at: Vec2,
+    /// m.
+    pub(crate) diameter: f32,
+    /// From where to where on the axis, 0 to 1.
+    pub(crate) span: [f32; 2],
+    /// Yield stress where it is another than that of the rest, MPa.
+    pub(crate) f_y_mpa: Option<f32>,
+}
+
+impl Laid {
+    /// Where it begins and ends along an axis of `length`, `cover` away from both faces, m.
+    pub(crate) fn ends(&self, length: f32, cover: f32) -> [f32; 2] {
+        self.span.map(|share| (share * length).clamp(cover, length - cover))
+    }
+}
+
+/// The longitudinal bars.
+pub(crate) fn bars(outline: Outline, r: &Reinforcement) -> Vec<Laid> {
     let stirrup = r.stirrups.as_ref().map_or(0.0, |s| s.diameter_mm);
     let mut list = Vec::new();
     for bars in &r.bars {
         let (Bars::Around { count, diameter_mm } | Bars::Row { count, diameter_mm, .. }) = *bars;
-        let inset = (r.cover_mm + stirrup + 0.5 * diameter_mm) / 1000.0;
+        let first = (r.cover_mm + stirrup + 0.5 * diameter_mm) / 1000.0;
+        let (inset, span, f_y_mpa) = match *bars {
+            Bars::Row { inset_mm, from, to, f_y_mpa, .. } => {
+                (first + inset_mm / 1000.0, [from, to], f_y_mpa)
+            }
+            Bars::Around { .. } => (first, [0.0, 1.0], None),
+        };
+        // Farther in, but as wide as the first layer.
+        let inner = |half: Vec2, side_deg: f32| match side_deg as i32 {
+            0 | 180 => half - Vec2::new(inset, first),
+            _ => half - Vec2::new(first, inset),
+        };
         let places = match (bars, outline) {
             (Bars::Around { .. }, Outline::Round(radius))
             | (Bars::Row { .. }, Outline::Round(radius)) => (0..count)
@@ -35,14 +66,15 @@ pub(crate) fn bars(outline: Outline, r: &Reinforcement) -> Vec<(Vec2, f32)> {
                 around(Vec2::new(depth, bottom) - inset, count)
             }
             (Bars::Row { side_deg, .. }, Outline::Rectangle(half)) => {
-                row(half - inset, half.y - inset, *side_deg, count)
+                row(inner(half, *side_deg), half.y - first, *side_deg, count)
             }
             (Bars::Row { side_deg, .. }, Outline::Girder { top, bottom, depth }) => {
                 let width = if *side_deg == 0.0 { top } else { bottom };
-                row(Vec2::new(depth, bottom) - inset, width - inset, *side_deg, count)
+                row(inner(Vec2::new(depth, bottom), *side_deg), width - first, *side_deg, count)
             }
         };
-        list.extend(places.into_iter().map(|p| (p, diameter_mm / 1000.0)));
+        let diameter = diameter_mm / 1000.0;
+        list.extend(places.into_iter().map(|at| Laid { at, diameter, span, f_y_mpa }));
     }
     list
 }

@@ -174,7 +174,31 @@ pub enum Bars {
         count: u32,
         /// Of one bar, mm.
         diameter_mm: f32,
+        /// How much farther in than the first layer, mm: a second layer.
+        #[serde(default)]
+        inset_mm: f32,
+        /// Where they begin on the axis, 0 to 1.
+        #[serde(default)]
+        from: f32,
+        /// Where they end (curtailed bars), 0 to 1.
+        #[serde(default = "whole")]
+        to: f32,
+        /// Yield stress where it is another than that of the rest, MPa.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        f_y_mpa: Option<f32>,
     },
+}
+
+impl Bars {
+    /// A layer of bars along the whole of one side.
+    #[must_use]
+    pub fn row(side_deg: f32, count: u32, diameter_mm: f32) -> Self {
+        Self::Row { side_deg, count, diameter_mm, inset_mm: 0.0, from: 0.0, to: 1.0, f_y_mpa: None }
+    }
+}
+
+fn whole() -> f32 {
+    1.0
 }
 
 /// Stirrups or hoops.
@@ -185,6 +209,9 @@ pub struct Stirrups {
     pub diameter_mm: f32,
     /// From one to the next, mm.
     pub spacing_mm: f32,
+    /// Yield stress where it is another than that of the bars, MPa.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub f_y_mpa: Option<f32>,
 }
 
 /// A post-tensioned tendon along a member.

@@ -26,6 +26,9 @@ pub struct Concrete {
     pub name: String,
     /// Characteristic cylinder strength, MPa. What is not given follows from it by Eurocode 2.
     pub fck_mpa: f32,
+    /// Mean cylinder strength where it was measured, MPa; f_ck + 8 where it was not.
+    #[serde(default)]
+    pub fcm_mpa: Option<f32>,
     /// Mean tensile strength, MPa.
     #[serde(default)]
     pub fctm_mpa: Option<f32>,

@@ -1,0 +1,217 @@
+//! Series of tests, each as a scene on the mesh that a user gets, raised to failure by the program's
+//! own strength: nothing here knows more than a scene can say.
+//!
+//! Bresler and Scordelis (1963), by Vecchio and Shim (2004): beams with stirrups, loaded in the
+//! middle. No. 9 bars of 28.7 mm 64 and 127 mm above the bottom, two No. 4 on top, stirrups No. 2;
+//! half of each is computed.
+
+use intrados_mechanics::{
+    Meshing,
+    analysis::Observer,
+    analyze,
+    model::{Failure, History, Point, Step},
+    prepare,
+    strength::{Along, Strength},
+};
+use intrados_scene::Scene;
+
+use super::*;
+
+/// A beam of Bresler and Scordelis.
+struct Beam {
+    name: &'static str,
+    /// Width, depth, span, mm.
+    size: [f64; 3],
+    /// MPa.
+    strength: f64,
+    /// No. 9 bars in the lower and the upper row.
+    bars: [u32; 2],
+    /// Of stirrups, mm.
+    spacing: f64,
+    /// kN and mm.
+    measured: [f64; 2],
+    mode: &'static str,
+}
+
+const BEAMS: [Beam; 4] = [
+    Beam {
+        name: "A1",
+        size: [307.0, 561.0, 3660.0],
+        strength: 24.1,
+        bars: [2, 2],
+        spacing: 210.0,
+        measured: [467.0, 14.2],
+        mode: "shear compression",
+    },
+    Beam {
+        name: "A3",
+        size: [307.0, 561.0, 6400.0],
+        strength: 35.1,
+        bars: [3, 3],
+        spacing: 210.0,
+        measured: [467.0, 35.8],
+        mode: "crushing",
+    },
+    Beam {
+        name: "B1",
+        size: [231.0, 556.0, 3660.0],
+        strength: 24.8,
+        bars: [2, 2],
+        spacing: 190.0,
+        measured: [445.0, 13.7],
+        mode: "shear compression",
+    },
+    Beam {
+        name: "B3",
+        size: [229.0, 556.0, 6400.0],
+        strength: 38.8,
+        bars: [3, 2],
+        spacing: 190.0,
+        measured: [356.0, 35.3],
+        mode: "crushing",
+    },
+];
+
+/// Half of a beam, its middle at the end of the axis.
+fn scene(beam: &Beam) -> String {
+    let [width, depth, span] = beam.size.map(|mm| 1e-3 * mm);
+    let long = 0.5 * span + 0.22;
+    let (support, plate) = (0.22 / long, 1.0 - 0.075 / long);
+    let [low, up] = beam.bars;
+    let (fcm, spacing) = (beam.strength, beam.spacing);
+    let fck = (fcm - 8.0_f64).max(0.6 * fcm);
+    // Measured from the outside of the stirrups, whose cover puts the lower row 64 mm up.
+    format!(
+        r#"(schema: "intrados.scene/1", title: "{}",
+        concretes: [(name: "tested", fck_mpa: {fck}, fcm_mpa: {fcm})],
+        members: [(id: "B", concrete: "tested", at: (0, 0, 0), body: Beam(
+            section: Rectangle(width_m: {width}, depth_m: {depth}), length_m: {long},
+            reinforcement: (cover_mm: 43.2, bars: [
+                Row(side_deg: 180, count: {low}, diameter_mm: 28.7, f_y_mpa: 555),
+                Row(side_deg: 180, count: {up}, diameter_mm: 28.7, f_y_mpa: 555, inset_mm: 63),
+                Row(side_deg: 0, count: 2, diameter_mm: 12.7, f_y_mpa: 345),
+            ], stirrups: (diameter_mm: 6.4, spacing_mm: {spacing}, f_y_mpa: 325))))],
+        supports: [
+            (member: "B", place: Surface(from: {support}, to: {support}, side_deg: 180), hold: Directions(x: false, y: true, z: true)),
+            (member: "B", place: End, hold: Directions(x: true, y: false, z: false)),
+        ],
+        loads: [(name: "jack", action: Force(place: Surface(from: {plate}, to: 1, side_deg: 0), force_kn: (0, -50, 0)), history: [(28, 0)])],
+        )"#,
+        beam.name
+    )
+}
+
+/// Tells where bars strain most, where it is asked for.
+#[derive(Default)]
+struct Talk(usize);
+
+impl Observer for Talk {
+    fn see(
+        &mut self,
+        structure: &System,
+        history: &History,
+        step: &Step,
+        points: &[[Point; 8]],
+    ) -> Result<(), Failure> {
+        self.0 += 1;
+        if std::env::var_os("EXPERIMENT_TALK").is_none() || !self.0.is_multiple_of(8) {
+            return Ok(());
+        }
+        let mesh = &structure.model.mesh;
+        let bars = structure.model.steel.iter().zip(&history.steel);
+        let pieces = bars.flat_map(|(s, w)| s.pieces.iter().zip(w).map(move |(p, w)| (s, p, w)));
+        let worst = pieces.max_by(|a, b| a.2.stress.abs().total_cmp(&b.2.stress.abs())).unwrap();
+        let middle = 0.5 * (worst.1.ends[0] + worst.1.ends[1]);
+        let worst_of = |value: &dyn Fn(&Point) -> f64| {
+            let of = |hex: usize| points[hex].iter().map(value).fold(0.0, f64::max);
+            let hex = (0..points.len()).max_by(|&a, &b| of(a).total_cmp(&of(b))).unwrap();
+            (of(hex), mesh.centre(hex as u32))
+        };
+        let (crack, at) = worst_of(&|p| 1e3 * p.crack);
+        let (crushed, there) = worst_of(&|p| p.damage[1]);
+        println!(
+            "    {} factor {:.3}: {} {:.0} MPa, plastic {:.4} at {middle:.2}; crack {crack:.2} mm at {at:.2}; crushed {crushed:.2} at {there:.2}; {} iterations, {} avalanche",
+            self.0,
+            step.factor,
+            worst.0.name,
+            1e-6 * worst.2.stress,
+            worst.2.bar.plastic,
+            step.iterations,
+            step.avalanche
+        );
+        Ok(())
+    }
+}
+
+/// What a member of a scene bears.
+fn strength(text: &str, element: Option<f64>) -> Strength {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("test.ron");
+    std::fs::write(&path, text).unwrap();
+    let scene = Scene::load(&path, &Job::default()).unwrap();
+    let assembly = &scene.structure.assemblies[0];
+    let mut prepared = prepare(&scene, assembly, Meshing { element }, &Job::default()).unwrap();
+    assert!(prepared.raise(&["jack"], Along::Automatic));
+    let begin = std::time::Instant::now();
+    let (life, _) =
+        analyze(&prepared, MarchSettings::of_life(), &Job::default(), &mut Talk::default())
+            .unwrap();
+    life.notes.iter().chain(&life.warnings).for_each(|n| println!("    {n}"));
+    let strength = life.strength.expect("it was raised");
+    println!(
+        "  {} unknowns, {} points of the curve, {:.0} s",
+        life.dof,
+        strength.curve.len(),
+        begin.elapsed().as_secs_f64()
+    );
+    strength
+}
+
+/// Says a result beside what was measured; the ratio.
+fn beside(name: &str, found: &Strength, times: f64, measured: [f64; 2], mode: &str) -> f64 {
+    let ratio = times * 1e-3 * found.peak.load_n / measured[0];
+    println!(
+        "  {name}: {:.0} kN at {:.1} mm, measured {:.0} at {:.1}: {ratio:.3}; {} ({}), measured {mode}; {}",
+        times * 1e-3 * found.peak.load_n,
+        1e3 * found.peak.displacement_m,
+        measured[0],
+        measured[1],
+        found.mode.words(),
+        found.because,
+        found.ended
+    );
+    ratio
+}
+
+#[test]
+#[ignore = "minutes"]
+fn beams_with_stirrups() {
+    let only = std::env::var("EXPERIMENT_ONLY").ok();
+    let mut ratios = Vec::new();
+    for beam in BEAMS.iter().filter(|b| only.as_deref().is_none_or(|o| o == b.name)) {
+        for half in [false, true] {
+            let element = (0.25e-3 * beam.size[0]).min(0.14) * if half { 0.5 } else { 1.0 };
+            let found = strength(&scene(beam), half.then_some(element));
+            ratios.push(beside(beam.name, &found, 2.0, beam.measured, beam.mode));
+            let points =
+                found.curve.iter().map(|p| (1e3 * p.displacement_m, 2e-3 * p.load_n)).collect();
+            draw(
+                &format!("bs-{}{}", beam.name.to_lowercase(), if half { "-fine" } else { "" }),
+                &format!("Beam {} of Bresler and Scordelis", beam.name),
+                ["displacement under the load, mm", "load, kN"],
+                &[
+                    Curve { name: "computed".into(), points, marked: false },
+                    Curve {
+                        name: "measured peak".into(),
+                        points: vec![(beam.measured[1], beam.measured[0])],
+                        marked: true,
+                    },
+                ],
+            );
+            if std::env::var_os("EXPERIMENT_COARSE").is_some() {
+                break;
+            }
+        }
+    }
+    println!("  computed over measured: {ratios:.3?}");
+}
