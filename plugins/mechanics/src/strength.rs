@@ -122,7 +122,7 @@ pub struct Strength {
 /// displacement: Park 1989 takes .8).
 pub const FAILED: f64 = 0.8;
 /// Share of the peak at which it is followed no further.
-const SPENT: f64 = 0.6;
+const SPENT: f64 = 0.78;
 /// How far the first step goes, over the longest measure of the member.
 const FIRST: f64 = 1e-6;
 /// By so much steps grow while the member answers as it did at first.
@@ -135,6 +135,8 @@ const SHORT: f64 = 0.04;
 const STEPS: usize = 400;
 /// It is followed no further than so many times the displacement at the first yielding.
 const DUCTILE: f64 = 12.0;
+/// Nor than so many times the displacement at the peak.
+const BEYOND: f64 = 2.0;
 /// How far parts may move, over the longest measure.
 const FAR: f64 = 0.1;
 /// A crack whose normal is so far off the axis is oblique, degrees.
@@ -371,6 +373,13 @@ impl<'a, 'm> Watch<'a, 'm> {
         {
             return Some(format!("the load has fallen below {SPENT} of its peak"));
         }
+        let at_peak = peak.displacement_m.abs();
+        if moved > BEYOND * at_peak
+            && self.yielding.is_none()
+            && now.load_factor < 0.97 * peak.load_factor
+        {
+            return Some(format!("it has moved {BEYOND} times as far as at its peak"));
+        }
         if let Along::Displacement(Some(to)) = self.raised.along
             && moved >= to * (1.0 - 1e-9)
         {
@@ -436,9 +445,12 @@ impl<'a, 'm> Watch<'a, 'm> {
         let peak = self.curve[self.peak];
         let at =
             |p: &CurvePoint| format!("{:.0} kN, {:.1} mm", 1e-3 * p.load_n, 1e3 * p.displacement_m);
-        if let Some((mode, name)) = &self.broken {
+        let broken = self.broken.as_ref();
+        let is_stirrup = |name: &str| name.starts_with("stirrup") || name.starts_with("hoop");
+        if let Some((mode, name)) = broken.filter(|(_, name)| !is_stirrup(name)) {
             return Ok((*mode, format!("{name} breaks")));
         }
+        let has_failed = has_failed || broken.is_some();
         let yielded =
             self.yielding.as_ref().filter(|(y, _)| y.displacement_m <= peak.displacement_m);
         let after =

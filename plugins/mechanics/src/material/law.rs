@@ -47,6 +47,8 @@ pub struct Setting {
     pub measure: Option<Measure>,
     /// Whether damage of tension knows directions.
     pub cracks: Cracks,
+    /// Whether planes that are open make concrete weaker along them (`cracks::softened`).
+    pub transverse: bool,
     /// Creep and shrinkage, or none.
     pub creep: Option<Creep>,
     /// Creep by this chain, whatever `creep` says.
@@ -79,6 +81,7 @@ impl Setting {
             spread: None,
             measure: None,
             cracks: Cracks::Diffuse,
+            transverse: true,
             creep: None,
             chain: None,
             ageing: false,

@@ -152,6 +152,11 @@ fn strength(text: &str, element: Option<f64>) -> Strength {
     let assembly = &scene.structure.assemblies[0];
     let mut prepared = prepare(&scene, assembly, Meshing { element }, &Job::default()).unwrap();
     assert!(prepared.raise(&["jack"], Along::Automatic));
+    for body in &mut prepared.model.bodies {
+        if let Matter::Concrete(mix) = &mut body.matter {
+            mix.1.transverse = std::env::var_os("EXPERIMENT_UNSOFTENED").is_none();
+        }
+    }
     let begin = std::time::Instant::now();
     let (life, _) =
         analyze(&prepared, MarchSettings::of_life(), &Job::default(), &mut Talk::default())
