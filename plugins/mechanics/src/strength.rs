@@ -104,7 +104,7 @@ pub struct Strength {
     pub curve: Vec<CurvePoint>,
     /// The highest.
     pub peak: CurvePoint,
-    /// Where a bar yields first.
+    /// Where a bar, no stirrup, yields first.
     pub yielding: Option<CurvePoint>,
     /// Where the load has fallen to [`FAILED`] of the peak.
     pub ultimate: Option<CurvePoint>,
@@ -237,6 +237,11 @@ pub(crate) fn raise(
     Ok((watch.tell(ended, job)?, history))
 }
 
+/// Whether steel of this name goes around the others.
+fn is_stirrup(name: &str) -> bool {
+    name.starts_with("stirrup") || name.starts_with("hoop")
+}
+
 /// How much of a load one of the factor is: what acts of it already, or all of it where nothing
 /// does.
 fn share_of(structure: &System, load: usize, time: f64) -> f64 {
@@ -342,12 +347,17 @@ impl<'a, 'm> Watch<'a, 'm> {
         }
         self.last = points.to_vec();
         for (steel, works) in self.structure.model.steel.iter().zip(&history.steel) {
+            let is_along = !is_stirrup(&steel.name);
             let (bar, tendon) = match &steel.kind {
                 SteelKind::Bar(bar) | SteelKind::Stressed(bar, _) => (Some(bar), None),
                 SteelKind::Tendon(tendon) => (None, Some(tendon)),
             };
             for work in works {
-                if bar.is_some() && self.yielding.is_none() && work.bar.plastic > 1e-5 {
+                if is_along
+                    && bar.is_some()
+                    && self.yielding.is_none()
+                    && work.bar.plastic > 1e-5
+                {
                     self.yielding = Some((point, steel.name.clone()));
                 }
                 if bar.is_some_and(|bar| work.bar.plastic.abs() > bar.rupture) {
@@ -446,7 +456,6 @@ impl<'a, 'm> Watch<'a, 'm> {
         let at =
             |p: &CurvePoint| format!("{:.0} kN, {:.1} mm", 1e-3 * p.load_n, 1e3 * p.displacement_m);
         let broken = self.broken.as_ref();
-        let is_stirrup = |name: &str| name.starts_with("stirrup") || name.starts_with("hoop");
         if let Some((mode, name)) = broken.filter(|(_, name)| !is_stirrup(name)) {
             return Ok((*mode, format!("{name} breaks")));
         }
