@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use intrados_damage::{ledger, zone::zone_at};
+use intrados_damage::{evidence::called, ledger, zone::zone_at};
 use intrados_predict::{doubted, foreseen};
 use intrados_scene::{
     Assembly, ErrorKind, Part, Problem, Scene, Severity, SteelLine, gltf,
@@ -104,7 +104,7 @@ fn scene(session: &Session, file: &Path) -> Result<(Vec<Problem>, bool), Failure
                 Problem::warning(
                     place,
                     "NOT_USED",
-                    format!("{} ({}): {}", item.item, item.source, item.verdict()),
+                    format!("{} ({}): {}", item.item, called(item.source), item.verdict()),
                 )
             };
             problems.extend(foreseen(&scene, &session.job)?.into_iter().map(not_used));

@@ -48,6 +48,7 @@ pub fn called(source: &str) -> &str {
     match source {
         "ct" => "CT",
         "gauges" => "strain gauges",
+        "photographed" => "photographs",
         other => other,
     }
 }

@@ -228,7 +228,7 @@ impl Predictor {
             }
             Some(Item::Slice(_)) => format!("reading slice {} of {slices}", self.next + 1),
             Some(Item::Life(_)) => self.label_of(&self.lives()),
-            Some(Item::Gauges(_)) => "what gauges felt".into(),
+            Some(Item::Gauges(_)) => "what strain gauges say".into(),
             Some(Item::Survey(_)) => "what was surveyed".into(),
             Some(Item::Photograph(..)) => "what a photograph shows".into(),
             Some(Item::Outside(source, ..)) => format!("what {} says", source.name()),
