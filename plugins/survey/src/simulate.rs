@@ -50,11 +50,10 @@ impl Dice {
     }
 }
 
-/// Bars of 16 mm with stirrups of 8 mm over them: under 40 mm, or under 15 mm where air alone
-/// attacks, which would take nothing of deeper ones.
+/// Bars of 16 mm with stirrups of 8 mm over them: under 40 mm, or under 15 mm where air attacks,
+/// which would take nothing of deeper ones.
 fn site(corrosion: Corrosion) -> Site {
-    let is_salt = matches!(corrosion.attack, Attack::Chloride { .. });
-    let cover = if is_salt { 0.040 } else { 0.015 };
+    let cover = if corrosion.carbonates() { 0.015 } else { 0.040 };
     let bars = Bars { weight: 1.0, cover, diameter: 0.016 };
     Site {
         corrosion: Ok(corrosion),
@@ -67,7 +66,7 @@ fn site(corrosion: Corrosion) -> Site {
 }
 
 fn placed(shows: &Shows) -> Vec<Placed<'_>> {
-    vec![Placed { number: 0, shows, zones: [ZONE; 2], before: 0.0 }]
+    vec![Placed { number: 0, shows, zones: [ZONE; 2], before: 0.0, face: None }]
 }
 
 fn holds(found: Estimate, truth: f64) -> bool {
@@ -78,16 +77,13 @@ fn holds(found: Estimate, truth: f64) -> bool {
 /// be seen.
 type Rusting = fn(&Possible, &Bars, &Dice) -> Option<Shows>;
 
-const RUSTING: [(&str, &str, Rusting); 10] = [
+const RUSTING: [(&str, &str, Rusting); 11] = [
     ("cover", "XD3", |truth, _, dice| {
         let mm = 32.0 + 1e3 * truth.other.cover + dice.normal(5.0) + dice.normal(3.0);
         Some(Shows::Cover { mm: mm.max(1.0), std_error_mm: 3.0 })
     }),
-    ("carbonation", "XC4", |truth, _, dice| {
-        let Attack::Carbonation(front) = &truth.other.attack else { panic!() };
-        let depth = 1e3 * front.depth(AGE) * (1.0 + dice.normal(0.15)) + dice.normal(2.0);
-        Some(Shows::Carbonation { mm: depth.max(0.0), std_error_mm: 2.0 })
-    }),
+    ("carbonation", "XC4", carbonation),
+    ("carbonation beside salt", "XC4, XD1", carbonation),
     ("chloride", "XD3", |truth, _, dice| {
         let Attack::Chloride { ingress, convection, .. } = &truth.other.attack else { panic!() };
         let model = 1.0 + dice.normal(0.15);
@@ -139,6 +135,12 @@ const RUSTING: [(&str, &str, Rusting); 10] = [
         dice.happens(often).then_some(Shows::WetSpot { area_m2: 0.5 })
     }),
 ];
+
+fn carbonation(truth: &Possible, _: &Bars, dice: &Dice) -> Option<Shows> {
+    let front = truth.other.front()?;
+    let depth = 1e3 * front.depth(AGE) * (1.0 + dice.normal(0.15)) + dice.normal(2.0);
+    Some(Shows::Carbonation { mm: depth.max(0.0), std_error_mm: 2.0 })
+}
 
 fn crack(width_mm: f64) -> Shows {
     Shows::Crack { width_mm, std_error_mm: 0.05, course: Course::Along, length_m: None }

@@ -148,6 +148,7 @@ fn placed<'a>(all: &[(usize, &'a Observation)]) -> Vec<Placed<'a>> {
             shows: &o.shows,
             zones: o.spot.along.map(zone),
             before: days(o).unwrap_or(0.0) * DAY,
+            face: o.spot.angle_deg.map(|deg| ((deg / 90.0).round() as i32).rem_euclid(4) as u8),
         }
     };
     all.iter().filter(|(_, o)| refusal(o).is_none()).map(one).collect()

@@ -40,7 +40,7 @@ use serde::Serialize;
 use crate::{
     CT, Origin, PredictError, PredictSettings, SliceReading,
     compared::score,
-    defect::defects,
+    defect::has_defects,
     limits::limits,
     prediction::{MemberPrediction, MissingEvidence, Prediction, SCHEMA},
     section,
@@ -613,7 +613,7 @@ impl Predictor {
         };
         let nothing = Shown::default();
         let photographed = self.photographed.get(&member).unwrap_or(&nothing);
-        !defects(scene, &m.id, photographed, readings).is_empty()
+        has_defects(scene, &m.id, photographed, readings)
     }
 
     /// The prediction from what is done so far.
