@@ -358,7 +358,7 @@ fn measured(evidence: &[&Evidence], whole: &Whole, cause: Cause, zone: usize) ->
         let speaks = e.zones.get(&cause).is_some_and(|zones| zones.0[zone].is_some());
         e.measured && speaks && stands.is_none()
     };
-    evidence.iter().any(|e| is_own(&e)).then(|| whole.causes.get(&cause)?.0[zone]).flatten()
+    evidence.iter().any(is_own).then(|| whole.causes.get(&cause)?.0[zone]).flatten()
 }
 
 /// Points of the normal distribution that are exceeded by chance so often.
