@@ -614,7 +614,7 @@ pub(crate) struct Measure {
     #[arg(long, value_name = "NAME", conflicts_with = "all")]
     pub(crate) sensor: Vec<String>,
     /// Where the variance comes from: of every surface its share by the error law, and how well the
-    /// field foretold what its steps bring
+    /// field predicted what its steps bring
     #[arg(long)]
     pub(crate) explain: bool,
     #[command(flatten)]

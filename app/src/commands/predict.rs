@@ -5,6 +5,7 @@ use std::{ffi::OsString, path::Path, sync::Arc, time::Duration};
 use bevy_app::App;
 use intrados_ct::detect;
 use intrados_damage::{
+    evidence::called,
     grading::{Profile, ProfileError},
     ledger::Group,
 };
@@ -199,7 +200,7 @@ fn table(document: &Document) -> String {
             number(m.truth.as_ref().map(|t| t.damage)),
             m.evidence
                 .values()
-                .map(|e| format!("{} {:.2}", e.source, e.damage))
+                .map(|e| format!("{} {:.2}", called(e.source), e.damage))
                 .collect::<Vec<_>>()
                 .join(", "),
         ]);
@@ -214,7 +215,11 @@ fn table(document: &Document) -> String {
         if let Some(check) = m.crack_check.as_ref().filter(|c| c.exceeded) {
             text += &format!(
                 "crack {}: {:.2} mm ({}), limit {} mm in {}\n",
-                m.name, check.width_mm, check.source, check.limit_mm, check.exposure
+                m.name,
+                check.width_mm,
+                called(check.source),
+                check.limit_mm,
+                check.exposure
             );
         }
     }
@@ -229,7 +234,7 @@ fn ledger(prediction: &Prediction) -> String {
     for group in Group::all(&prediction.items) {
         let first = group.first();
         let member = prediction.name_of(&first.member).to_owned();
-        rows.push([member, first.source.to_owned(), group.name(), first.verdict()]);
+        rows.push([member, called(first.source).to_owned(), group.name(), first.verdict()]);
     }
     if rows.len() > 1 { format!("\n{}\n", output::table(&rows.map_rows())) } else { String::new() }
 }

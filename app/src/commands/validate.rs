@@ -2,13 +2,10 @@
 
 use std::path::Path;
 
-use intrados_damage::{ledger, zone::zone_at};
+use intrados_damage::{evidence::called, ledger};
 use intrados_predict::{doubted, foreseen};
-use intrados_scene::{
-    Assembly, ErrorKind, Part, Problem, Scene, Severity, SteelLine, gltf,
-    structure::{Observation, Shows},
-};
-use intrados_survey::only_of_rust;
+use intrados_scene::{ErrorKind, Problem, Scene, Severity, gltf, structure::Observation};
+use intrados_survey::{Beforehand, beforehand};
 use serde::Serialize;
 
 use super::render::MapRows;
@@ -104,7 +101,7 @@ fn scene(session: &Session, file: &Path) -> Result<(Vec<Problem>, bool), Failure
                 Problem::warning(
                     place,
                     "NOT_USED",
-                    format!("{} ({}): {}", item.item, item.source, item.verdict()),
+                    format!("{} ({}): {}", item.item, called(item.source), item.verdict()),
                 )
             };
             problems.extend(foreseen(&scene, &session.job)?.into_iter().map(not_used));
@@ -125,16 +122,20 @@ fn scene(session: &Session, file: &Path) -> Result<(Vec<Problem>, bool), Failure
 /// such steel or is of another matter: what can be told without computing. Those of one member and
 /// one reason are one warning.
 fn unheard(scene: &Scene) -> Vec<Problem> {
-    let mut found: Vec<(&str, (&'static str, String), Vec<&Observation>)> = Vec::new();
+    let mut found: Vec<(&str, Beforehand, Vec<&Observation>)> = Vec::new();
     for observation in &scene.structure.observations {
         let Some(assembly) = scene.structure.assembly_of(&observation.member) else { continue };
-        let Some(why) = why_unheard(assembly, observation) else { continue };
+        let Some(why) = beforehand(assembly, observation) else { continue };
         match found.iter_mut().find(|(m, w, _)| *m == observation.member && *w == why) {
             Some((_, _, all)) => all.push(observation),
             None => found.push((&observation.member, why, vec![observation])),
         }
     }
-    let told = |(member, (code, why), all): (&str, (&'static str, String), Vec<&Observation>)| {
+    let told = |(member, why, all): (&str, Beforehand, Vec<&Observation>)| {
+        let (code, why) = match why {
+            Beforehand::AsConcrete(why) => ("NOT_CONCRETE", why),
+            Beforehand::NotUsed(why) => ("NOT_USED", format!("not used, because {why}")),
+        };
         let first = all.first().map_or(String::new(), |o| intrados_survey::name(o));
         let more = match all.len() {
             0 | 1 => String::new(),
@@ -144,64 +145,6 @@ fn unheard(scene: &Scene) -> Vec<Problem> {
         Problem::warning(place, code, format!("{first}{more}: {why}"))
     };
     found.into_iter().map(told).collect()
-}
-
-/// The code of a warning, and its reason. The rules are those of the survey's and the forecast's
-/// rust, by zone.
-fn why_unheard(assembly: &Assembly, observation: &Observation) -> Option<(&'static str, String)> {
-    let shows = &observation.shows;
-    if let Some(matter) = &assembly.matter
-        && matches!(
-            shows,
-            Shows::Rebound { .. } | Shows::Velocity { .. } | Shows::CoreStrength { .. }
-        )
-    {
-        let why = format!("the member is of {}, and is read as if that were concrete", matter.name);
-        return Some(("NOT_CONCRETE", why));
-    }
-    if !only_of_rust(shows) {
-        return None;
-    }
-    let not_used = |why: String| Some(("NOT_USED", format!("not used, because {why}")));
-    let is_bar = |line: &&SteelLine| line.part != Part::Tendon;
-    if !assembly.steel.iter().any(|line| is_bar(&line)) {
-        return not_used(match &assembly.matter {
-            Some(matter) => format!("it speaks of the rust of bars, and the member is of {}", matter.name),
-            None => "it speaks of the rust of bars, and none are known of the member: give reinforcement in details of the scene".into(),
-        });
-    }
-    let Some(exposure) = &assembly.exposure else {
-        return not_used("nothing says what attacks the member: give its exposure class".into());
-    };
-    let by_salt = exposure.chloride.is_some()
-        || exposure.classes().any(|class| class.starts_with("XD") || class.starts_with("XS"));
-    match shows {
-        Shows::Chloride { .. } if !by_salt => {
-            return not_used(
-                "by its exposure class there is no salt: name an XD or XS class in exposure".into(),
-            );
-        }
-        Shows::Carbonation { .. } if by_salt => {
-            return not_used("by its exposure class salt takes its steel first, and carbonation is not computed beside it".into());
-        }
-        _ => {}
-    }
-    let [from, to] = observation.spot.along.map(|at| zone_at(f64::from(at)));
-    let bars = assembly.steel.iter().filter(is_bar);
-    (!assembly.is_tunnel() && !bars.flat_map(|l| l.line.windows(2)).any(|ends| runs(assembly, ends, [from, to])))
-        .then(|| ("NOT_USED", "not used, because no bars run along the member there: give reinforcement in details of the scene".to_owned()))
-}
-
-/// Whether a piece of a bar runs along a member within these zones of it.
-fn runs(assembly: &Assembly, ends: &[glam::Vec3], [from, to]: [usize; 2]) -> bool {
-    let (axis, start) = (assembly.frame.axis, assembly.frame.start);
-    let [a, b] = [ends[0], ends[1]];
-    let is_along = (b - a).normalize_or_zero().dot(axis.normalize_or_zero()).abs() >= 0.9;
-    let zone = |p: glam::Vec3| {
-        zone_at(f64::from((p - start).dot(axis) / axis.length_squared().max(1e-12)))
-    };
-    let (one, other) = (zone(a), zone(b));
-    is_along && one.min(other) <= to && one.max(other) >= from
 }
 
 impl Report {

@@ -73,7 +73,8 @@ pub struct Crack {
     pub length_px: f64,
     /// Length along it, mm.
     pub length_mm: f64,
-    /// Mean opening, mm: missing mass over length, as if it held nothing but air.
+    /// Opening, mm: missing mass of a cut, as if it held nothing but air; the mean of the middle
+    /// third of all cuts, so that pores on its way do not count as its width.
     pub width_mm: f64,
     /// Its middle pixel, mm from the left and top edges.
     pub at_mm: [f64; 2],
@@ -87,9 +88,34 @@ pub struct Found {
     pub list: Vec<Crack>,
     /// Their pixels.
     pub mask: Mask,
+    /// Air in these beyond what cracks of their lengths and widths hold, pixels: of pores that they
+    /// run through.
+    pub(crate) besides: f64,
+}
+
+/// What may be a crack.
+struct Piece {
+    shape: Shape,
+    /// Its width, and the air in it beyond that, pixels.
+    width: f64,
+    besides: f64,
+    pixels: Vec<usize>,
+}
+
+impl Piece {
+    fn of(shape: Shape, pixels: Vec<usize>, grey: &Grid<f32>, air_drop: f64) -> Self {
+        let mass: f64 = pixels.iter().map(|&i| f64::from(1.0 - grey.data[i])).sum();
+        let width = (shape.opening(&pixels, grey) / air_drop).max(0.0);
+        let besides = (mass / air_drop - width * shape.length).max(0.0);
+        Self { shape, width, besides, pixels }
+    }
 }
 
 impl Found {
+    fn nothing(width: usize, height: usize) -> Self {
+        Self { list: Vec::new(), mask: Mask::new(width, height, false), besides: 0.0 }
+    }
+
     /// Whether more than half of a dark component belongs to cracks.
     pub(crate) fn cover(&self, pixels: &[usize]) -> bool {
         2 * pixels.iter().filter(|&&i| self.mask.data[i]).count() > pixels.len()
@@ -98,27 +124,23 @@ impl Found {
     /// Takes the pieces that are long enough, each with its width in pixels, and of the others
     /// those that lie no farther from these than they would have to be long: scraps of the same
     /// crack.
-    fn keep(
-        &mut self,
-        pieces: Vec<(Shape, f64, Vec<usize>)>,
-        pixel_mm: f32,
-        settings: &CrackSettings,
-    ) {
+    fn keep(&mut self, pieces: Vec<Piece>, pixel_mm: f32, settings: &CrackSettings) {
         let (long, short): (Vec<_>, Vec<_>) =
-            pieces.into_iter().partition(|(shape, ..)| shape.is_long(pixel_mm, settings));
-        long.iter().for_each(|(shape, width, pixels)| self.take(*shape, *width, pixels, pixel_mm));
+            pieces.into_iter().partition(|piece| piece.shape.is_long(pixel_mm, settings));
+        long.iter().for_each(|piece| self.take(piece, pixel_mm));
         if long.is_empty() || short.is_empty() {
             return;
         }
         let away = self.mask.map(|cracked| !cracked).distance_within();
-        for (shape, width, pixels) in short {
-            if pixels.iter().any(|&i| away.data[i] * pixel_mm <= settings.likely_length_mm) {
-                self.take(shape, width, &pixels, pixel_mm);
+        for piece in &short {
+            if piece.pixels.iter().any(|&i| away.data[i] * pixel_mm <= settings.likely_length_mm) {
+                self.take(piece, pixel_mm);
             }
         }
     }
 
-    fn take(&mut self, shape: Shape, width_px: f64, pixels: &[usize], pixel_mm: f32) {
+    fn take(&mut self, piece: &Piece, pixel_mm: f32) {
+        let Piece { shape, pixels, .. } = piece;
         let mm = f64::from(pixel_mm);
         let (x, y) = self.mask.place(shape.middle);
         let side = |place: &dyn Fn(usize) -> usize| {
@@ -133,11 +155,12 @@ impl Found {
         self.list.push(Crack {
             length_px: shape.length,
             length_mm: shape.length * mm,
-            width_mm: width_px * mm,
+            width_mm: piece.width * mm,
             at_mm: [(x as f64 + 0.5) * mm, (y as f64 + 0.5) * mm],
             box_mm,
         });
         pixels.iter().for_each(|&i| self.mask.data[i] = true);
+        self.besides += piece.besides;
     }
 }
 
@@ -161,14 +184,13 @@ pub fn find(
     };
     let (low, high) = (above(settings.low), above(settings.high));
     let mut pieces = Vec::new();
-    let mut found = Found { list: Vec::new(), mask: Mask::new(grey.width, grey.height, false) };
+    let mut found = Found::nothing(grey.width, grey.height);
     for pixels in regions(&low) {
         if !pixels.iter().any(|&i| high.data[i]) {
             continue;
         }
         if let Some(shape) = Shape::of(&pixels, low.width, settings) {
-            let mass: f64 = pixels.iter().map(|&i| f64::from(1.0 - grey.data[i])).sum();
-            pieces.push((shape, (mass / (shape.length * air_drop)).max(0.0), pixels));
+            pieces.push(Piece::of(shape, pixels, grey, air_drop));
         }
     }
     found.keep(pieces, pixel_mm, settings);
@@ -192,7 +214,7 @@ pub fn find_likely(
     };
     let (low, high) = (above(settings.possible), above(settings.likely));
     let mut pieces = Vec::new();
-    let mut found = Found { list: Vec::new(), mask: Mask::new(grey.width, grey.height, false) };
+    let mut found = Found::nothing(grey.width, grey.height);
     for pixels in regions(&low) {
         if pixels.len() < settings.min_pixels || !pixels.iter().any(|&i| high.data[i]) {
             continue;
@@ -201,8 +223,7 @@ pub fn find_likely(
         if shape.length * shape.length
             >= f64::from(settings.likely_elongation) * pixels.len() as f64
         {
-            let mass: f64 = pixels.iter().map(|&i| f64::from(1.0 - grey.data[i])).sum();
-            pieces.push((shape, (mass / (shape.length * air_drop)).max(0.0), pixels));
+            pieces.push(Piece::of(shape, pixels, grey, air_drop));
         }
     }
     found.keep(pieces, pixel_mm, settings);
@@ -237,10 +258,11 @@ pub(crate) fn outside_nests(
 /// The cracks of a label mask by the same measures of shape; the width is area over length.
 pub(crate) fn find_in_labels(labels: &Mask, pixel_mm: f32, settings: &CrackSettings) -> Found {
     let mut pieces = Vec::new();
-    let mut found = Found { list: Vec::new(), mask: Mask::new(labels.width, labels.height, false) };
+    let mut found = Found::nothing(labels.width, labels.height);
     for pixels in regions(labels) {
         if let Some(shape) = Shape::of(&pixels, labels.width, settings) {
-            pieces.push((shape, pixels.len() as f64 / shape.length, pixels));
+            let width = pixels.len() as f64 / shape.length;
+            pieces.push(Piece { shape, width, besides: 0.0, pixels });
         }
     }
     found.keep(pieces, pixel_mm, settings);
@@ -351,8 +373,9 @@ pub fn length(pixels: &[usize], width: usize) -> f64 {
 struct Shape {
     /// Its length, pixels.
     length: f64,
-    /// The pixel in its middle.
+    /// The pixel in its middle, and the one where it begins.
     middle: usize,
+    start: usize,
 }
 
 impl Shape {
@@ -390,7 +413,21 @@ impl Shape {
             .copied()
             .min_by_key(|i| (cost[i].abs_diff(total / 2), *i))
             .unwrap_or(start);
-        Self { length: f64::from(total) / 5.0 + 1.0, middle }
+        Self { length: f64::from(total) / 5.0 + 1.0, middle, start }
+    }
+
+    /// Missing mass of its cuts, one a pixel along it: the mean of the middle third of them.
+    fn opening(&self, pixels: &[usize], grey: &Grid<f32>) -> f64 {
+        let (_, cost) = farthest(pixels, grey.width, self.start);
+        // A length is a number of steps and one pixel, so that there is at least one cut.
+        let mut cuts = vec![0.0; self.length as usize];
+        for &i in pixels {
+            let at = (cost[&i] / 5) as usize;
+            cuts[at.min(self.length as usize - 1)] += f64::from(1.0 - grey.data[i]);
+        }
+        cuts.sort_by(f64::total_cmp);
+        let middle = &cuts[cuts.len() / 3..cuts.len() - cuts.len() / 3];
+        middle.iter().sum::<f64>() / middle.len() as f64
     }
 }
 

@@ -268,14 +268,16 @@ impl Decided<'_> {
             / body_area;
         let by_specks = specks / LIKELY;
         let counted = if air.settings.method == Method::Network { specks } else { 0.0 };
-        let errors = [by_threshold, by_noise, by_neighbours, by_specks];
+        // Pores that a crack runs through belong to its dark pixels; or it is wide there itself.
+        let besides = cracks.besides / body_area;
+        let errors = [by_threshold, by_noise, by_neighbours, by_specks, besides / LIKELY];
         job.step(10, 12)?;
         let pores = table(&found, &is_crack, normal, pixel_mm);
         job.step(11, 12)?;
         Ok(Detection {
             sampling_error: block_bootstrap(&pores_mask, &normal.body),
             porosity: Estimate {
-                value: porosity + counted,
+                value: porosity + counted + besides,
                 std_error: errors.iter().map(|e| e * e).sum::<f64>().sqrt(),
             },
             pores,

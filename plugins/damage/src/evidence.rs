@@ -48,6 +48,7 @@ pub fn called(source: &str) -> &str {
     match source {
         "ct" => "CT",
         "gauges" => "strain gauges",
+        "photographed" => "photographs",
         other => other,
     }
 }
@@ -81,6 +82,10 @@ pub struct Evidence {
     /// Causes, and the sources whose word on them is in it already and must not count twice.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub includes: Vec<(Cause, String)>,
+    /// Pairs of causes of which it cannot tell the second from the first: what it says of the first
+    /// is by both, and what is known of the second is taken out of it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub mixed: Vec<(Cause, Cause)>,
     /// Whether it was measured on the member, and not foretold.
     pub measured: bool,
     /// What it rests on, one line for people.
@@ -111,6 +116,7 @@ impl Evidence {
             zones,
             stands: BTreeMap::new(),
             includes: Vec::new(),
+            mixed: Vec::new(),
             measured,
             basis,
             crack_width_mm: None,

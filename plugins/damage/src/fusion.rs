@@ -13,6 +13,12 @@
 //! disagree leave the largest damage, with an error bar that reaches the others. Causes are then
 //! taken together, 1 − Π(1 − d); one that nothing speaks of counts as nothing, with the error that
 //! the profile declares for it.
+//!
+//! A slow pulse and the pores of a slice speak of the same concrete. What is lost by the one, 1 − m,
+//! is what pores leave of stiffness times what is lost without a trace, (1 − a c)(1 − d): c is known
+//! from whoever measured it in that zone, and a is what a loss of strength takes of stiffness, from
+//! .3 (sound concretes of several strengths: EN 1992-1-1, table 3.1, E goes with f to the .3) to 1
+//! (holes, which take both alike), equally likely.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -122,6 +128,47 @@ impl Piece<'_> {
         };
         Self { reading, ..self }
     }
+}
+
+/// What a loss of strength takes of stiffness, see the module.
+const OF_STIFFNESS: [f64; 2] = [0.3, 1.0];
+/// In how many places stiffness is lost without a trace, evenly up to what makes the profile's
+/// standard error of that (ours).
+const SOMEWHERE: f64 = 0.1;
+
+/// What is lost without a trace, of a stiffness that is lost by that and by a known loss of
+/// concrete: mean and deviation of its posterior, where beforehand it is nothing ± `unknown`.
+fn without(mixed: Estimate, concrete: Estimate, unknown: f64) -> Estimate {
+    const STEPS: usize = 24;
+    let part = |k: usize| (k as f64 + 0.5) / STEPS as f64;
+    let most = (unknown * (3.0 / SOMEWHERE).sqrt()).min(1.0);
+    let [low, high] =
+        [-3.0, 3.0].map(|z| (concrete.value + z * concrete.std_error).clamp(0.0, 1.0));
+    let normal = |x: f64, of: Estimate| {
+        let z = (x - of.value) / of.std_error.max(SMALLEST_ERROR);
+        (-0.5 * z * z).exp()
+    };
+    // How probable what was read is, if so much is lost without a trace.
+    let likelihood = |lost: f64| {
+        let mut sum = 0.0;
+        for c in (0..STEPS).map(|k| low + (high - low) * part(k)) {
+            let shares =
+                (0..STEPS).map(|k| OF_STIFFNESS[0] + (OF_STIFFNESS[1] - OF_STIFFNESS[0]) * part(k));
+            let read = |share: f64| normal(1.0 - (1.0 - share * c) * (1.0 - lost), mixed);
+            sum += normal(c, concrete) * shares.map(read).sum::<f64>();
+        }
+        sum
+    };
+    let weights = |k: usize| (most * part(k), SOMEWHERE / STEPS as f64);
+    let all = (0..STEPS).map(weights).chain(std::iter::once((0.0, 1.0 - SOMEWHERE)));
+    let [mut total, mut sum, mut squares] = [1e-300, 0.0, 0.0];
+    for (lost, prior) in all {
+        let weight = prior * likelihood(lost);
+        (total, sum, squares) =
+            (total + weight, sum + weight * lost, squares + weight * lost * lost);
+    }
+    let value = sum / total;
+    Estimate { value, std_error: (squares / total - value * value).max(0.0).sqrt() }
 }
 
 /// No physics is surer than this: keeps a reading that claims no error from silencing all others.
@@ -236,6 +283,29 @@ impl FusionRule {
         whole
     }
 
+    /// What one of them says of a cause in a zone, without what is known of causes that it mixes
+    /// with it.
+    fn piece<'a>(
+        &self,
+        one: &'a Evidence,
+        evidence: &[&Evidence],
+        whole: &Whole,
+        cause: Cause,
+        zone: usize,
+    ) -> Option<Piece<'a>> {
+        let reading = one.zones.get(&cause)?.0[zone]?;
+        let mixed = one.mixed.iter().find(|mixed| mixed.0 == cause);
+        let other = mixed.and_then(|mixed| measured(evidence, whole, mixed.1, zone));
+        let unknown = self.unknown.get(&cause).copied().unwrap_or(0.0);
+        Some(Piece {
+            source: one.source,
+            cause,
+            reading: other.map_or(reading, |other| without(reading, other, unknown)),
+            measured: one.measured,
+            stands: one.stands.get(&cause).map_or(Stands::default(), |stands| stands[zone]),
+        })
+    }
+
     fn zone(
         &self,
         evidence: &[&Evidence],
@@ -243,31 +313,24 @@ impl FusionRule {
         zone: usize,
         whole: &mut Whole,
     ) -> Option<Estimate> {
-        let says = |e: &&Evidence| {
-            let stands = e.stands.get(&cause).map_or(Stands::default(), |stands| stands[zone]);
-            Some(Piece {
-                source: e.source,
-                cause,
-                reading: e.zones.get(&cause)?.0[zone]?,
-                measured: e.measured,
-                stands,
-            })
-        };
+        let speaks = |e: &&&Evidence| e.zones.get(&cause).is_some_and(|z| z.0[zone].is_some());
         // What another piece has taken in does not speak again.
         let is_in = |piece: &Piece| {
-            let speaks = |e: &&&Evidence| says(e).is_some();
             evidence
                 .iter()
                 .filter(speaks)
                 .any(|e| e.includes.iter().any(|(c, source)| *c == cause && source == piece.source))
         };
-        let pieces: Vec<Piece> =
-            evidence.iter().filter_map(says).filter(|piece| !is_in(piece)).collect();
+        let pieces: Vec<Piece> = evidence
+            .iter()
+            .filter_map(|e| self.piece(e, evidence, whole, cause, zone))
+            .filter(|piece| !is_in(piece))
+            .collect();
         let fused = self.fuse(&pieces)?;
         whole.counted.extend(
             evidence
                 .iter()
-                .filter(|e| says(e).is_some() && (e.measured || !fused.yielded))
+                .filter(|e| speaks(e) && (e.measured || !fused.yielded))
                 .map(|e| e.source),
         );
         if fused.conflict {
@@ -286,6 +349,16 @@ impl FusionRule {
         }
         Some(fused.damage)
     }
+}
+
+/// What came of a cause that was fused before, where somebody measured it in the zone itself.
+fn measured(evidence: &[&Evidence], whole: &Whole, cause: Cause, zone: usize) -> Option<Estimate> {
+    let is_own = |e: &&Evidence| {
+        let stands = e.stands.get(&cause).and_then(|stands| stands[zone].prior);
+        let speaks = e.zones.get(&cause).is_some_and(|zones| zones.0[zone].is_some());
+        e.measured && speaks && stands.is_none()
+    };
+    evidence.iter().any(is_own).then(|| whole.causes.get(&cause)?.0[zone]).flatten()
 }
 
 /// Points of the normal distribution that are exceeded by chance so often.

@@ -35,7 +35,7 @@ pub enum Basis {
     /// Something was measured there.
     Measured,
     /// Nothing was: a forecast alone.
-    Foretold,
+    Forecast,
     /// Nothing is known.
     #[default]
     None,
@@ -47,7 +47,7 @@ impl Basis {
     pub fn name(self) -> &'static str {
         match self {
             Self::Measured => "measured",
-            Self::Foretold => "foretold",
+            Self::Forecast => "forecast",
             Self::None => "none",
         }
     }
@@ -59,7 +59,7 @@ impl Basis {
         std::array::from_fn(|zone| {
             let measured = evidence.iter().filter(|e| speaks(e, zone)).map(|e| e.measured);
             measured.reduce(|a, b| a || b).map_or(Self::None, |measured| {
-                if measured { Self::Measured } else { Self::Foretold }
+                if measured { Self::Measured } else { Self::Forecast }
             })
         })
     }
@@ -67,7 +67,7 @@ impl Basis {
     /// Of a whole member: measured where anything is.
     #[must_use]
     pub fn of(zones: &[Self; ZONES]) -> Self {
-        [Self::Measured, Self::Foretold]
+        [Self::Measured, Self::Forecast]
             .into_iter()
             .find(|basis| zones.contains(basis))
             .unwrap_or_default()
@@ -114,7 +114,7 @@ impl Looked {
 /// What can be said of a member's state.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Verdict {
-    /// In words: a state, or *between* two, *foretold* where nothing was measured; or
+    /// In words: a state, or *between* two, after *forecast:* where nothing was measured; or
     /// [`NO_EVIDENCE`].
     pub state: String,
     /// Probability of each state.
@@ -168,7 +168,7 @@ impl Verdict {
             format!("between {} and {}", name(best), name(worst))
         };
         Self {
-            state: if basis == Basis::Foretold { format!("foretold {said}") } else { said },
+            state: if basis == Basis::Forecast { format!("forecast: {said}") } else { said },
             probability: profile
                 .states
                 .iter()
@@ -203,7 +203,7 @@ impl Verdict {
 /// calls for eyes, not for repair.
 fn inspection(basis: Basis, looked: Looked) -> String {
     let percent = (100.0 * looked.unseen).round();
-    if basis == Basis::Foretold {
+    if basis == Basis::Forecast {
         "Inspect: nobody has looked at it yet, and the forecast expects no damage.".into()
     } else if percent > 0.0 {
         format!("Inspect: nothing was found, but {percent} % of the length has not been looked at.")
@@ -333,13 +333,13 @@ mod tests {
     fn nobody_looked_is_not_sound() {
         let profile = Profile::default();
         let verdict =
-            Verdict::of(&profile, Some(reading(0.0, 0.34)), &[], Basis::Foretold, Looked::NOWHERE);
+            Verdict::of(&profile, Some(reading(0.0, 0.34)), &[], Basis::Forecast, Looked::NOWHERE);
         let likely: Vec<f64> =
             ["sound", "fair", "poor", "severe"].map(|s| verdict.probability[s]).to_vec();
         for (found, expected) in likely.iter().zip([0.2321, 0.3075, 0.3218, 0.1386]) {
             assert!((found - expected).abs() < 1e-4, "{likely:?}");
         }
-        assert_eq!(verdict.state, "foretold between sound and poor");
+        assert_eq!(verdict.state, "forecast: between sound and poor");
         assert!(
             verdict.advice.starts_with("Inspect")
                 && !verdict.advice.to_lowercase().contains("no action"),
@@ -361,13 +361,13 @@ mod tests {
         );
         assert_eq!(sound.advice, profile.states[0].advice);
         assert_eq!(of(0.25, 0.05, Basis::Measured).state, "between fair and poor");
-        let foretold = of(0.0, 0.03, Basis::Foretold);
-        assert_eq!(foretold.state, "foretold sound");
-        assert!(!foretold.is_settled() && !foretold.advice.contains("No action"));
-        // Nobody who is undecided or foretold is told to do nothing, and the worst that may be
+        let forecast = of(0.0, 0.03, Basis::Forecast);
+        assert_eq!(forecast.state, "forecast: sound");
+        assert!(!forecast.is_settled() && !forecast.advice.contains("No action"));
+        // Nobody who is undecided or of which only a forecast speaks is told to do nothing, and the worst that may be
         // counts.
         for (d, s) in [(0.05, 0.1), (0.2, 0.3), (0.45, 0.1), (0.6, 0.2)] {
-            for basis in [Basis::Measured, Basis::Foretold] {
+            for basis in [Basis::Measured, Basis::Forecast] {
                 let verdict = of(d, s, basis);
                 assert!(
                     verdict.is_settled() || verdict.advice.starts_with("Inspect"),
@@ -426,20 +426,20 @@ mod tests {
             "Inspect: nothing was found, but 50 % of the length has not been looked at."
         );
         assert_eq!(seen.within_months, Some(24));
-        let foretold = of(reading(0.0, 0.34), &[], Basis::Foretold, Looked::NOWHERE);
-        assert!(foretold.to_inspect && !foretold.advice.contains("poor"));
-        assert_eq!(foretold.within_months, profile.inspect_within_months);
+        let forecast = of(reading(0.0, 0.34), &[], Basis::Forecast, Looked::NOWHERE);
+        assert!(forecast.to_inspect && !forecast.advice.contains("poor"));
+        assert_eq!(forecast.within_months, profile.inspect_within_months);
         // What is settled needs no inspection of its own.
         let settled = of(reading(0.0, 0.03), &[], Basis::Measured, half);
         assert!(!settled.to_inspect && settled.within_months == Some(72));
-        // Damage that was found, is more probable than not, or cracks that are foretold count as
+        // Damage that was found, is more probable than not, or cracks that are forecast count as
         // before.
         let found = Looked { found: true, ..half };
         for verdict in [
             of(reading(0.08, 0.27), &[], Basis::Measured, found),
             of(reading(0.12, 0.27), &[], Basis::Measured, half),
-            of(reading(0.2, 0.34), &[], Basis::Foretold, Looked::NOWHERE),
-            of(reading(0.0, 0.34), &[reading(0.4, 0.16)], Basis::Foretold, Looked::NOWHERE),
+            of(reading(0.2, 0.34), &[], Basis::Forecast, Looked::NOWHERE),
+            of(reading(0.0, 0.34), &[reading(0.4, 0.16)], Basis::Forecast, Looked::NOWHERE),
         ] {
             assert!(!verdict.to_inspect && verdict.advice.contains("treat it as"), "{verdict:?}");
             assert!(verdict.within_months.is_some_and(|months| months <= 12), "{verdict:?}");

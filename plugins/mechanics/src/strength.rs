@@ -353,11 +353,7 @@ impl<'a, 'm> Watch<'a, 'm> {
                 SteelKind::Tendon(tendon) => (None, Some(tendon)),
             };
             for work in works {
-                if is_along
-                    && bar.is_some()
-                    && self.yielding.is_none()
-                    && work.bar.plastic > 1e-5
-                {
+                if is_along && bar.is_some() && self.yielding.is_none() && work.bar.plastic > 1e-5 {
                     self.yielding = Some((point, steel.name.clone()));
                 }
                 if bar.is_some_and(|bar| work.bar.plastic.abs() > bar.rupture) {

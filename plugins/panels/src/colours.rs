@@ -14,10 +14,10 @@ pub(crate) const SELECTED: Color32 = Color32::from_rgb(255, 176, 0);
 /// No value here.
 pub(crate) const UNKNOWN: Color32 = Color32::from_gray(96);
 
-/// Share of grey in the colour of what is only foretold.
+/// Share of grey in the colour of what is only forecast.
 pub(crate) const PALER: f32 = intrados_report::surface::PALER;
 
-/// The same colour, paler: of what is only foretold.
+/// The same colour, paler: of what is only forecast.
 pub(crate) fn paler([r, g, b]: [u8; 3]) -> [u8; 3] {
     lerp(Color32::from_rgb(r, g, b), UNKNOWN, PALER)
         .to_array()
@@ -27,7 +27,7 @@ pub(crate) fn paler([r, g, b]: [u8; 3]) -> [u8; 3] {
 }
 
 /// Steps of severity drawn as squares: their number says it, the colour only helps. Filled up to
-/// the best state that it may be in, framed up to the worst; what is only foretold is framed alone.
+/// the best state that it may be in, framed up to the worst; what is only forecast is framed alone.
 pub(crate) fn severity(ui: &mut egui::Ui, verdict: &Verdict, steps: usize) -> egui::Response {
     let [best, worst] = verdict.run.unwrap_or_default();
     let step = worst;

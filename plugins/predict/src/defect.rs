@@ -140,6 +140,44 @@ pub(crate) fn defects(
     found.chain(grouped(slices).iter().flat_map(|group| sectioned(group))).collect()
 }
 
+/// Whether [`defects`] has any, without putting them together.
+#[must_use]
+pub(crate) fn has_defects(
+    scene: &Scene,
+    member: &str,
+    photographed: &Shown,
+    slices: &[SliceReading],
+) -> bool {
+    let member_of = scene.members.iter().find(|m| m.id == member);
+    let length = member_of.map_or(1.0, |m| f64::from(m.frame.axis.length()));
+    let surveyed = survey::of_member(scene, member).map(|(_, o)| o);
+    let all: Vec<&Observation> = surveyed.chain(&photographed.observations).collect();
+    let last = |group: &Vec<usize>| group.last().is_some_and(|&k| is_defect(&all[k].shows));
+    let beyond = |lost: Option<Estimate>| lost.is_some_and(|lost| is_beyond(&lost));
+    let shows = |s: &SliceReading| {
+        !s.cracks.is_empty() || beyond(s.lost) || beyond(s.steel.map(|steel| steel.loss))
+    };
+    survey::found_again(&all, length).iter().any(last) || slices.iter().any(shows)
+}
+
+/// Whether an observation found something, and not nothing, nor is a reading of an instrument.
+fn is_defect(shows: &Shows) -> bool {
+    match shows {
+        Shows::Crack { .. }
+        | Shows::Spall { .. }
+        | Shows::Rust { .. }
+        | Shows::Efflorescence { .. }
+        | Shows::WetSpot { .. } => true,
+        Shows::Sounding { hollow_m2, .. } => *hollow_m2 > 0.0,
+        _ => false,
+    }
+}
+
+/// Whether a share is more than its error.
+fn is_beyond(lost: &Estimate) -> bool {
+    lost.value > 1.96 * lost.std_error && lost.value > 0.0
+}
+
 impl Found {
     fn of(o: &Observation) -> Self {
         let (size, std_error, unit) = match o.shows {
@@ -159,6 +197,9 @@ impl Found {
 
 /// What an observation found; none where it is a reading of an instrument, or where nothing was.
 fn seen(source: &'static str, o: &Observation) -> Option<Defect> {
+    if !is_defect(&o.shows) {
+        return None;
+    }
     let mut defect = Defect {
         kind: "",
         along: o.spot.is_placed().then(|| o.spot.along.map(f64::from)),
@@ -190,7 +231,7 @@ fn seen(source: &'static str, o: &Observation) -> Option<Defect> {
             defect.size = depth_mm.map_or(String::new(), |mm| format!("{mm:.0} mm deep"));
             defect.area_m2 = Some(area_m2);
         }
-        Shows::Sounding { hollow_m2, tapped_m2 } if hollow_m2 > 0.0 => {
+        Shows::Sounding { hollow_m2, tapped_m2 } => {
             defect.kind = "hollow area";
             defect.size = format!("of {tapped_m2:.2} m² tapped");
             defect.area_m2 = Some(hollow_m2);
@@ -242,8 +283,7 @@ fn sectioned(sections: &[&SliceReading]) -> Vec<Defect> {
         )
     });
     let share = |kind, lost: &dyn Fn(&SliceReading) -> Option<Estimate>| {
-        let beyond = |l: &Estimate| l.value > 1.96 * l.std_error && l.value > 0.0;
-        let found = || sections.iter().filter_map(|s| Some((*s, lost(s).filter(beyond)?)));
+        let found = || sections.iter().filter_map(|s| Some((*s, lost(s).filter(is_beyond)?)));
         let (slice, worst) = found().max_by(|a, b| a.1.value.total_cmp(&b.1.value))?;
         let [value, error] = [worst.value, worst.std_error].map(|x| 100.0 * x);
         let size = format!("{value:.1} ± {error:.1} % of the section");

@@ -51,7 +51,7 @@ pub(crate) fn limits(
             ),
         );
     }
-    let unmeasured = members.iter().filter(|m| m.basis == Basis::Foretold).count();
+    let unmeasured = members.iter().filter(|m| m.basis == Basis::Forecast).count();
     if unmeasured > 0 {
         limits.insert(
             0,

@@ -33,7 +33,7 @@ use super::{
     },
     words::{
         NOTHING, bad_probability, due, files, finding, level, many, matters, metres, plus_minus,
-        state, within, word, worse_half,
+        within, word, worse_half,
     },
 };
 
@@ -222,7 +222,7 @@ impl<'a> Page<'a> {
     }
 
     /// Whether a member has a sheet of its own: something was measured or found on it, its truth is
-    /// known, or damage worth a line is foretold.
+    /// known, or damage worth a line is forecast.
     fn has_sheet(&self, m: &MemberPrediction) -> bool {
         matters(m)
     }
@@ -348,7 +348,7 @@ impl<'a> Page<'a> {
             .collect();
         counts.push((count(&open), "measured, state not settled".into()));
         counts.push((
-            count(&|m| m.basis == Basis::Foretold),
+            count(&|m| m.basis == Basis::Forecast),
             "forecast only, nothing measured".into(),
         ));
         counts.push((
@@ -453,11 +453,7 @@ impl<'a> Page<'a> {
     /// A member's state: as bad as it may be, dashed where it is a forecast.
     fn chip(&self, m: &MemberPrediction) -> String {
         let last = m.state_probability.len();
-        chip(
-            &state(m),
-            m.state_run.map(|[_, worst]| level(worst, last)),
-            m.basis == Basis::Foretold,
-        )
+        chip(&m.state, m.state_run.map(|[_, worst]| level(worst, last)), m.basis == Basis::Forecast)
     }
 
     fn state_chip(&self, state: &str) -> String {

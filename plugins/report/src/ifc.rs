@@ -18,7 +18,7 @@ use intrados_stage::{
 };
 use serde_json::{Map, Value, json};
 
-use crate::words::{state, word};
+use crate::words::word;
 
 /// What puts them there, which is ours.
 const SCRIPT: &str = include_str!("ifc.py");
@@ -91,7 +91,7 @@ fn properties(m: &MemberPrediction, prediction: &Prediction, date: &str) -> Valu
             all.insert(name.into(), value);
         }
     };
-    put("State", json!(state(m)));
+    put("State", json!(m.state));
     put("Damage", json!(m.damage));
     put("DamageStandardError", json!(m.damage_std_error));
     for (state, probability) in &m.state_probability {

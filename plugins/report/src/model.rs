@@ -38,14 +38,14 @@ pub(super) fn write(
     let error: Vec<f64> =
         facets.iter().map(|f| reading(f).map_or(f64::NAN, |r| r.std_error)).collect();
     let zone: Vec<f64> = facets.iter().map(|f| f.zone as f64).collect();
-    // 1 measured, 0 foretold.
+    // 1 measured, 0 forecast.
     let basis = |f: &crate::surface::Facet| match prediction
         .members
         .get(f.member)
         .map(|m| m.zone_basis[f.zone])
     {
         Some(Basis::Measured) => 1.0,
-        Some(Basis::Foretold) => 0.0,
+        Some(Basis::Forecast) => 0.0,
         _ => f64::NAN,
     };
     let measured: Vec<f64> = facets.iter().map(basis).collect();

@@ -21,7 +21,6 @@ use crate::{
         photograph::{Sensor, photograph},
         radiograph::radiograph,
     },
-    words::state,
 };
 
 /// Pictures of members in a report; the worst ones.
@@ -161,7 +160,7 @@ impl Record {
                     shots.push((
                         painted,
                         camera,
-                        format!("{}: {}, coloured by damage", member.name, state(member)),
+                        format!("{}: {}, coloured by damage", member.name, member.state),
                     ));
                 }
             }

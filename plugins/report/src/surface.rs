@@ -13,7 +13,7 @@ use intrados_scene::{Material, Mesh, Object, Part, Scene, gltf::Model};
 
 /// Linear grey of what nothing is known of.
 pub const UNKNOWN: Vec3 = Vec3::splat(0.35);
-/// Share of that grey in the colour of what is only foretold.
+/// Share of that grey in the colour of what is only forecast.
 pub const PALER: f32 = 0.6;
 /// Where a cut is made, as a share of the axis, is not moved by less than this.
 const CUT: f32 = 1e-5;
@@ -117,9 +117,9 @@ pub fn colour(damage: Option<f64>) -> Vec3 {
     Vec3::new(linear(r), linear(g), linear(b))
 }
 
-/// The same of what is only foretold: half of it grey.
+/// The same of what is only forecast: half of it grey.
 #[must_use]
-pub fn foretold(damage: Option<f64>) -> Vec3 {
+pub fn forecast(damage: Option<f64>) -> Vec3 {
     colour(damage).lerp(UNKNOWN, PALER)
 }
 
@@ -128,7 +128,7 @@ pub fn foretold(damage: Option<f64>) -> Vec3 {
 pub(crate) fn look(prediction: &Prediction, member: usize, zone: usize) -> Vec3 {
     let Some(m) = prediction.members.get(member) else { return UNKNOWN };
     let damage = m.zones.0[zone].map(|r| r.value);
-    if m.zone_basis[zone] == Basis::Foretold { foretold(damage) } else { colour(damage) }
+    if m.zone_basis[zone] == Basis::Forecast { forecast(damage) } else { colour(damage) }
 }
 
 /// The scene with its members coloured by damage, of whose surfaces `facets` are; everything else
@@ -197,9 +197,9 @@ mod tests {
     fn nothing_known_is_grey() {
         assert_eq!(colour(None), UNKNOWN);
         assert!(colour(Some(1.0)).y > colour(Some(0.0)).y);
-        // What is foretold is nearer to grey than what is measured, and not grey.
+        // What is forecast is nearer to grey than what is measured, and not grey.
         for d in [0.0, 0.5, 1.0].map(Some) {
-            let [pale, full] = [foretold(d), colour(d)].map(|c| c.distance(UNKNOWN));
+            let [pale, full] = [forecast(d), colour(d)].map(|c| c.distance(UNKNOWN));
             assert!(pale > 0.0 && pale < 0.5 * full, "{d:?}");
         }
     }

@@ -104,7 +104,7 @@ pub(super) fn gauge(
 
 /// What is a forecast alone is hollow.
 fn fill(basis: Basis) -> &'static str {
-    if basis == Basis::Foretold { "hollow" } else { "fill" }
+    if basis == Basis::Forecast { "hollow" } else { "fill" }
 }
 
 /// Damage along a member's axis: a bar for each zone with its 95 % interval, what each source says

@@ -3,7 +3,6 @@
 use intrados_damage::{
     evidence::called,
     grading::{Profile, State},
-    verdict::Basis,
 };
 use intrados_predict::{Defect, MemberPrediction};
 use intrados_stage::Estimate;
@@ -52,14 +51,6 @@ pub(crate) fn defect(d: &Defect) -> String {
     let quantity = d.quantity().map_or_else(String::new, |q| format!(", {q}"));
     let change = d.change().map_or_else(String::new, |c| format!(" [{c}]"));
     format!("{}{size}{quantity}{change}", d.kind)
-}
-
-/// A member's state, as an owner reads it.
-pub(crate) fn state(m: &MemberPrediction) -> String {
-    match m.state.strip_prefix("foretold ") {
-        Some(state) if m.basis == Basis::Foretold => format!("forecast: {state}"),
-        _ => m.state.clone(),
-    }
 }
 
 /// A text in which files stand without the folders that they lie in.

@@ -245,7 +245,7 @@ fn every_kind_of_evidence_on_every_kind_of_member_ends_once() {
     assert_eq!(evidence_csv(&prediction).lines().count(), 1 + prediction.items.len());
 }
 
-/// A life that cannot be computed, and one that is; readings made from planted truth; a foretold
+/// A life that cannot be computed, and one that is; readings made from planted truth; a forecast
 /// damage that yields to what is measured.
 #[test]
 fn lives_and_simulated_readings_are_in_the_ledger() {

@@ -5,6 +5,8 @@
 //! has come off or sounds hollow is lost to its depth: the cover's, where nobody measured it (± half
 //! of it). All of that is ours; no code turns a finding into strength.
 
+use std::collections::BTreeMap;
+
 use intrados_damage::{grading::GradingRule, zone::ZONES};
 use intrados_scene::structure::{Course, Shows};
 use intrados_stage::Estimate;
@@ -49,8 +51,24 @@ pub(crate) fn lost(site: &Site, placed: &[Placed], rule: &GradingRule) -> ByZone
     std::array::from_fn(|zone| {
         let inside = |p: &&Placed| (p.zones[0]..=p.zones[1]).contains(&zone);
         let found = placed.iter().filter(inside).filter_map(|p| one(site, zone, p.shows, rule));
+        let found = found.chain(intact(placed.iter().filter(inside)));
         found.reduce(|worst, next| if next.value > worst.value { next } else { worst })
     })
+}
+
+/// Where nothing was found: each face that was looked at speaks for itself, and all of them for the
+/// section. None where nobody looked.
+fn intact<'a>(placed: impl Iterator<Item = &'a Placed<'a>>) -> Option<Estimate> {
+    let mut faces: BTreeMap<Option<u8>, f64> = BTreeMap::new();
+    for p in placed {
+        if let Shows::Intact { seen, .. } = p.shows {
+            let most = faces.entry(p.face).or_default();
+            *most = most.max(seen * p.around());
+        }
+    }
+    let seen = faces.values().sum::<f64>().min(1.0);
+    (!faces.is_empty())
+        .then(|| Estimate { value: 0.0, std_error: LOOKED.hypot(UNSEEN * (1.0 - seen)) })
 }
 
 fn one(site: &Site, zone: usize, shows: &Shows, rule: &GradingRule) -> Option<Estimate> {
@@ -87,9 +105,29 @@ fn one(site: &Site, zone: usize, shows: &Shows, rule: &GradingRule) -> Option<Es
         }),
         Shows::Sounding { hollow_m2, .. } if hollow_m2 > 0.0 => Some(off(hollow_m2, cover, 0.5)),
         Shows::Sounding { .. } => Some(Estimate { value: 0.0, std_error: LOOKED }),
-        Shows::Intact { seen, .. } => {
-            Some(Estimate { value: 0.0, std_error: LOOKED.hypot(UNSEEN * (1.0 - seen)) })
-        }
         _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Nothing found at one face leaves the three others open; at all four, or all around, none.
+    #[test]
+    fn one_face_is_not_the_section() {
+        let shows = Shows::Intact { seen: 1.0, limit_mm: 0.15 };
+        let error = |faces: &[Option<u8>]| {
+            let placed: Vec<Placed> = faces
+                .iter()
+                .map(|&face| Placed { number: 0, shows: &shows, zones: [4; 2], before: 0.0, face })
+                .collect();
+            intact(placed.iter()).unwrap().std_error
+        };
+        let around = error(&[None]);
+        assert!((around - LOOKED).abs() < 1e-12);
+        assert!((error(&[Some(0)]) - LOOKED.hypot(0.75 * UNSEEN)).abs() < 1e-12);
+        assert!((error(&[Some(0), Some(0)]) - error(&[Some(0)])).abs() < 1e-12);
+        assert!((error(&[Some(0), Some(1), Some(2), Some(3)]) - around).abs() < 1e-12);
     }
 }

@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 
 mod again;
+mod beforehand;
 mod findings;
 pub mod photographed;
 mod rust;
@@ -11,5 +12,5 @@ mod strength;
 mod weighed;
 
 pub use again::found_again;
-pub use rust::only_of_rust;
+pub use beforehand::{Beforehand, beforehand};
 pub use weighed::*;

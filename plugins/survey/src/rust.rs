@@ -138,7 +138,7 @@ impl Weighed {
         let heard: Vec<&Placed> = placed.iter().filter(|p| speaks(p.shows)).collect();
         let heard: Vec<&Placed> = heard
             .into_iter()
-            .filter(|p| match deaf(site, &corrosion.attack, p) {
+            .filter(|p| match deaf(site, corrosion, p) {
                 None => true,
                 Some(_) if !only_of_rust(p.shows) => false,
                 Some(why) => {
@@ -225,9 +225,13 @@ impl Weighed {
     }
 }
 
+/// Why a profile of salt is not heard where the exposure class knows of none.
+pub(crate) const NO_SALT: &str = "by its exposure class there is no salt: name an XD or XS class in exposure, so that the profile can be weighed";
+/// Why a depth of carbonation is not heard where the exposure class names salt alone.
+pub(crate) const SALT_ALONE: &str = "by its exposure class salt alone attacks: name an XC class beside it in exposure, so that the depth can be weighed";
+
 /// Whether it says nothing of anything but rust.
-#[must_use]
-pub fn only_of_rust(shows: &Shows) -> bool {
+pub(crate) fn only_of_rust(shows: &Shows) -> bool {
     matches!(
         shows,
         Shows::Cover { .. }
@@ -241,15 +245,11 @@ pub fn only_of_rust(shows: &Shows) -> bool {
 }
 
 /// Why an observation says nothing of the rust of these bars.
-fn deaf(site: &Site, attack: &Attack, placed: &Placed) -> Option<String> {
-    let by_salt = matches!(attack, Attack::Chloride { .. });
+fn deaf(site: &Site, corrosion: &Corrosion, placed: &Placed) -> Option<String> {
+    let by_salt = matches!(corrosion.attack, Attack::Chloride { .. });
     match placed.shows {
-        Shows::Chloride { .. } if !by_salt => Some(
-            "by its exposure class there is no salt: name an XD or XS class in exposure, so that the profile can be weighed".into(),
-        ),
-        Shows::Carbonation { .. } if by_salt => Some(
-            "by its exposure class salt takes its steel first, and carbonation is not computed beside it".into(),
-        ),
+        Shows::Chloride { .. } if !by_salt => Some(NO_SALT.into()),
+        Shows::Carbonation { .. } if !corrosion.carbonates() => Some(SALT_ALONE.into()),
         _ if bars_at(site, placed).is_none() => {
             Some("no bars are known there: add them to the member's reinforcement".into())
         }
@@ -271,7 +271,10 @@ fn alike(heard: &[&Placed], one: &Placed) -> f64 {
     if matches!(one.shows, Shows::Cover { .. }) {
         return 1.0;
     }
-    let same = |p: &&&Placed| p.shows.kind() == one.shows.kind() && p.zones == one.zones;
+    // What is intact at one face says nothing of another.
+    let is_beside = |p: &Placed| matches!(p.shows, Shows::Intact { .. }) && p.face != one.face;
+    let same =
+        |p: &&&Placed| p.shows.kind() == one.shows.kind() && p.zones == one.zones && !is_beside(p);
     heard.iter().filter(same).count() as f64
 }
 
@@ -279,7 +282,13 @@ fn alike(heard: &[&Placed], one: &Placed) -> f64 {
 fn logarithms(site: &Site, draws: &[Possible], placed: &Placed) -> Vec<f64> {
     let Some((bars, outer)) = bars_at(site, placed) else { return vec![0.0; draws.len()] };
     let age = (site.age - placed.before).max(0.0);
-    draws.iter().map(|draw| logarithm(placed.shows, draw, &bars, outer, age)).collect()
+    let shows = match *placed.shows {
+        Shows::Intact { seen, limit_mm } => {
+            Shows::Intact { seen: seen * placed.around(), limit_mm }
+        }
+        ref other => other.clone(),
+    };
+    draws.iter().map(|draw| logarithm(&shows, draw, &bars, outer, age)).collect()
 }
 
 /// The same for one of them.
@@ -291,7 +300,7 @@ fn logarithm(shows: &Shows, draw: &Possible, bars: &Bars, outer: f64, age: f64) 
             return robust((1e-3 * mm - (outer + draw.other.cover).max(0.0)) / error);
         }
         Shows::Carbonation { mm, std_error_mm } => {
-            let Attack::Carbonation(front) = &draw.other.attack else { return 0.0 };
+            let Some(front) = draw.other.front() else { return 0.0 };
             let depth = 1e3 * front.depth(age);
             let error = std_error_mm.hypot(MODEL * depth);
             return robust((mm - depth) / error) - error.ln();

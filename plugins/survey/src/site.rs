@@ -22,6 +22,15 @@ pub(crate) struct Placed<'a> {
     pub(crate) zones: [usize; 2],
     /// Before the last of them, s.
     pub(crate) before: f64,
+    /// On which of four faces, where somebody says.
+    pub(crate) face: Option<u8>,
+}
+
+impl Placed<'_> {
+    /// The share of the surface around that it may speak for: one of four faces is a quarter.
+    pub(crate) fn around(&self) -> f64 {
+        if self.face.is_some() { 0.25 } else { 1.0 }
+    }
 }
 
 /// What is known of a member whose observations are read.

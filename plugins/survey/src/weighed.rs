@@ -148,6 +148,7 @@ fn placed<'a>(all: &[(usize, &'a Observation)]) -> Vec<Placed<'a>> {
             shows: &o.shows,
             zones: o.spot.along.map(zone),
             before: days(o).unwrap_or(0.0) * DAY,
+            face: o.spot.angle_deg.map(|deg| ((deg / 90.0).round() as i32).rem_euclid(4) as u8),
         }
     };
     all.iter().filter(|(_, o)| refusal(o).is_none()).map(one).collect()
@@ -178,7 +179,7 @@ fn together(strengths: &ByZone, findings: &ByZone) -> ByZone {
 
 /// What is said so far.
 #[derive(Default)]
-struct Said {
+pub(crate) struct Said {
     zones: BTreeMap<Cause, Zones>,
     stands: BTreeMap<Cause, [intrados_damage::evidence::Stands; ZONES]>,
     unused: BTreeMap<usize, String>,
@@ -186,7 +187,7 @@ struct Said {
 
 impl Said {
     /// What is said of a cause in some zones, spread along the member.
-    fn put(&mut self, cause: Cause, said: &ByZone, profile: &Profile, site: &Site) {
+    pub(crate) fn put(&mut self, cause: Cause, said: &ByZone, profile: &Profile, site: &Site) {
         let field = Field::of(profile, cause, site.length);
         // A zone's own word counts in full; one that says less than what was expected beforehand
         // must not leave the zone less known than that.
@@ -209,13 +210,17 @@ impl Said {
         self.stands.insert(cause, field.stands(&words));
     }
 
-    fn evidence(&mut self, source: &'static str, basis: String) -> Option<Evidence> {
+    pub(crate) fn evidence(&mut self, source: &'static str, basis: String) -> Option<Evidence> {
         let mut zones = std::mem::take(&mut self.zones);
         zones.retain(|_, zones| zones.worst().is_some());
         let mut evidence = Evidence::new(source, true, zones, basis)?;
         evidence.stands = std::mem::take(&mut self.stands);
         if evidence.zones.contains_key(&Cause::Steel) {
             evidence.includes = vec![(Cause::Steel, FORECAST.to_owned())];
+        }
+        // A pulse is slow in pores, too.
+        if evidence.zones.contains_key(&Cause::Stiffness) {
+            evidence.mixed = vec![(Cause::Stiffness, Cause::Concrete)];
         }
         Some(evidence)
     }

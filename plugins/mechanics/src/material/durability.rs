@@ -60,8 +60,12 @@ pub struct Corrosion {
     pub current: f64,
     /// What was assumed, and whose value it is; empty: all was given.
     pub assumed: Vec<String>,
+    /// Where air attacks beside salt: how, by the means of what was assumed.
+    pub beside: Option<Carbonated>,
     /// What else it may be, equally likely each; empty: nothing else.
     others: Vec<Other>,
+    /// By which class that is, and the strength of the concrete, Pa.
+    acid: Option<(&'static Acid, f64)>,
     /// Where all that may be is drawn from.
     spread: Spread,
 }
@@ -75,8 +79,20 @@ pub struct Other {
     pub current: f64,
     /// By how much covers differ from the drawing, m.
     pub cover: f64,
+    /// Where air attacks beside salt: rust begins with the front that comes first, and goes on as
+    /// with salt once that is there, too.
+    pub beside: Option<Carbonated>,
     /// Where something else has begun the rust, whatever the cover: when, s after the attack began.
     pub since: Option<f64>,
+}
+
+/// Carbonation where salt attacks, too.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Carbonated {
+    /// Its front.
+    pub front: Front,
+    /// Corrosion current of steel that it has reached and salt has not, A/m².
+    pub current: f64,
 }
 
 /// What is not known exactly of an attack.
@@ -164,28 +180,64 @@ const PER_MICROMETRE: f64 = 0.01 / 11.6;
 const OTHERS: u64 = 512;
 /// Seed of all of them: the same of every member, so that neighbours of one kind are alike.
 const SEED: u64 = 0x7275_7374;
+/// The same of carbonation beside salt.
+const SEED_BESIDE: u64 = 0x0061_6972;
 
 impl Corrosion {
     /// By an attack that is known.
     #[must_use]
     pub(crate) fn given(attack: Attack, current: f64) -> Self {
         let spread = Spread::Given(attack, current);
-        Self { attack, current, assumed: Vec::new(), others: Vec::new(), spread }
+        Self {
+            attack,
+            current,
+            assumed: Vec::new(),
+            beside: None,
+            others: Vec::new(),
+            acid: None,
+            spread,
+        }
     }
 
-    /// By one exposure class alone, see the table of this module: `fck` in Pa, `temperature` in K.
+    /// By exposure classes alone (`"XC4, XD3"`), see the table of this module: `fck` in Pa,
+    /// `temperature` in K.
     ///
     /// # Errors
     /// Why nothing is computed.
     pub fn of_class(class: &str, fck: f64, temperature: f64) -> Result<Self, CorrosionError> {
-        Self::assumed(std::iter::once(class), fck, temperature)
+        Self::assumed(class.split(", "), fck, temperature)
     }
 
     /// So many things that may be, equally likely each: for whoever knows more and weighs them. The
     /// first are those that [`lost`](Self::lost) is the mean of, where something was assumed.
     #[must_use]
     pub fn possible(&self, count: usize) -> Vec<Other> {
-        (0..count as u64).map(|k| self.spread.draw(&Draw(Key::new(SEED, k)))).collect()
+        (0..count as u64).map(|k| drawn(self.spread, self.acid, k)).collect()
+    }
+
+    /// With the carbonation of a class that is named beside salt; as it is where none is.
+    #[must_use]
+    pub(crate) fn beside<'a>(mut self, classes: impl Iterator<Item = &'a str>, fck: f64) -> Self {
+        let named: Vec<&str> = classes.collect();
+        let class = CARBONATION.iter().find(|c| named.contains(&c.name));
+        let Some(class) = class.filter(|_| matches!(self.attack, Attack::Chloride { .. })) else {
+            return self;
+        };
+        self.acid = Some((class, fck));
+        let (attack, current, assumed) = class.means(fck);
+        if let Attack::Carbonation(front) = attack {
+            self.beside = Some(Carbonated { front, current });
+        }
+        self.assumed.extend(assumed);
+        self.others =
+            (0..self.others.len() as u64).map(|k| drawn(self.spread, self.acid, k)).collect();
+        self
+    }
+
+    /// Whether carbonation is computed, alone or beside salt.
+    #[must_use]
+    pub fn carbonates(&self) -> bool {
+        self.beside.is_some() || matches!(self.attack, Attack::Carbonation(_))
     }
 
     /// By the exposure class alone, of a concrete of characteristic strength `fck` (Pa) at a mean
@@ -201,7 +253,8 @@ impl Corrosion {
     ) -> Result<Self, CorrosionError> {
         let named: Vec<&str> = classes.collect();
         if let Some(class) = CHLORIDE.iter().find(|c| named.contains(&c.name)) {
-            return Ok(Spread::Salt(class, fck, temperature).corrosion());
+            let salt = Spread::Salt(class, fck, temperature).corrosion();
+            return Ok(salt.beside(named.iter().copied(), fck));
         }
         if named.contains(&"XD2") {
             return Err(CorrosionError::UnknownChloride);
@@ -216,7 +269,8 @@ impl Corrosion {
     /// When steel under `cover` (m) begins to rust, s after the attack began.
     #[must_use]
     pub fn initiation(&self, cover: f64) -> f64 {
-        self.attack.initiation(cover)
+        let beside = self.beside.map_or(f64::INFINITY, |air| air.front.initiation(cover));
+        self.attack.initiation(cover).min(beside)
     }
 
     /// What some bars have lost at an age (s), by Faraday's law all around: the mean over all that
@@ -227,8 +281,8 @@ impl Corrosion {
             return Lost::default();
         }
         if self.others.is_empty() {
-            let nominal =
-                Other { attack: self.attack, current: self.current, cover: 0.0, since: None };
+            let (attack, current, beside) = (self.attack, self.current, self.beside);
+            let nominal = Other { attack, current, cover: 0.0, beside, since: None };
             let (share, any) = nominal.lost(bars, age);
             return Lost { share, std_error: 0.0, depassivated: f64::from(u8::from(any)) };
         }
@@ -272,13 +326,37 @@ impl Other {
 
     /// When steel under a cover of the drawing (m) begins to rust, s after the attack began.
     fn initiation(&self, cover: f64) -> f64 {
-        self.since.unwrap_or_else(|| self.attack.initiation((cover + self.cover).max(0.0)))
+        let [by_attack, beside] = self.fronts(cover);
+        self.since.unwrap_or(by_attack.min(beside))
+    }
+
+    /// When the attack and when carbonation beside it reach steel under a cover of the drawing (m),
+    /// s after the attack began.
+    fn fronts(&self, cover: f64) -> [f64; 2] {
+        let cover = (cover + self.cover).max(0.0);
+        let beside = self.beside.map_or(f64::INFINITY, |air| air.front.initiation(cover));
+        [self.attack.initiation(cover), beside]
+    }
+
+    /// The front of carbonation, alone or beside salt.
+    #[must_use]
+    pub fn front(&self) -> Option<Front> {
+        match self.attack {
+            Attack::Carbonation(front) => Some(front),
+            Attack::Chloride { .. } => self.beside.map(|air| air.front),
+        }
     }
 
     /// How deep rust has gone into it all around, m.
     #[must_use]
     pub fn depth(&self, cover: f64, age: f64) -> f64 {
-        corroded(self.current, age - self.initiation(cover), 1.0)
+        if let Some(since) = self.since {
+            return corroded(self.current, age - since, 1.0);
+        }
+        let [by_attack, beside] = self.fronts(cover);
+        let before =
+            self.beside.map_or(0.0, |air| corroded(air.current, age.min(by_attack) - beside, 1.0));
+        before + corroded(self.current, age - by_attack, 1.0)
     }
 }
 
@@ -374,16 +452,26 @@ const CONVECTION: f64 = 8.9e-3;
 /// three tenths, the current of rust by as much as it is.
 const GIVEN: [f64; 2] = [0.3, 1.0];
 
+/// The k-th thing that may be.
+fn drawn(spread: Spread, acid: Option<(&'static Acid, f64)>, k: u64) -> Other {
+    let beside = acid.and_then(|(class, fck)| {
+        let draw = Draw(Key::new(SEED_BESIDE, k));
+        let Attack::Carbonation(front) = class.draw(fck, &draw) else { return None };
+        Some(Carbonated { front, current: PER_MICROMETRE * draw.lognormal(5, class.rate) })
+    });
+    Other { beside, ..spread.draw(&Draw(Key::new(SEED, k))) }
+}
+
 impl Spread {
     /// The corrosion of an exposure class: its means, and what else may be.
     fn corrosion(self) -> Corrosion {
-        let others = (0..OTHERS).map(|k| self.draw(&Draw(Key::new(SEED, k)))).collect();
+        let others = (0..OTHERS).map(|k| drawn(self, None, k)).collect();
         let (attack, current, assumed) = match self {
             Self::Acid(class, fck) => class.means(fck),
             Self::Salt(class, fck, temperature) => class.means(fck, temperature),
             Self::Given(attack, current) => (attack, current, Vec::new()),
         };
-        Corrosion { attack, current, assumed, others, spread: self }
+        Corrosion { attack, current, assumed, beside: None, others, acid: None, spread: self }
     }
 
     fn draw(self, draw: &Draw) -> Other {
@@ -394,12 +482,14 @@ impl Spread {
                 attack: class.draw(fck, draw),
                 current: current(class.rate),
                 cover,
+                beside: None,
                 since: None,
             },
             Self::Salt(class, fck, temperature) => Other {
                 attack: class.draw(fck, temperature, draw),
                 current: current(class.rate),
                 cover,
+                beside: None,
                 since: None,
             },
             Self::Given(attack, given) => {
@@ -425,7 +515,7 @@ impl Spread {
                     true => draw.lognormal(5, [given, GIVEN[1] * given]),
                     false => 0.0,
                 };
-                Other { attack, current, cover, since: None }
+                Other { attack, current, cover, beside: None, since: None }
             }
         }
     }

@@ -206,12 +206,12 @@ impl Draft<'_> {
         let Some(exposure) = &self.member.exposure else {
             return Ok(Corrosion::assumed(std::iter::empty(), 0.0, self.model.temperature));
         };
+        let fck = self.model.bodies.iter().find_map(|b| {
+            if let Matter::Concrete(mix) = &b.matter { Some(mix.0.fck) } else { None }
+        });
+        let fck =
+            fck.unwrap_or(structure::ASSUMED_CONCRETE.parse::<Class>().map_or(30e6, |c| c.fck));
         let Some(chloride) = &exposure.chloride else {
-            let fck = self.model.bodies.iter().find_map(|b| {
-                if let Matter::Concrete(mix) = &b.matter { Some(mix.0.fck) } else { None }
-            });
-            let fck =
-                fck.unwrap_or(structure::ASSUMED_CONCRETE.parse::<Class>().map_or(30e6, |c| c.fck));
             return Ok(Corrosion::assumed(exposure.classes(), fck, self.model.temperature));
         };
         let ingress = Ingress::new(
@@ -227,7 +227,8 @@ impl Draft<'_> {
             convection: 0.0,
         };
         // 1 µA/cm² is .01 A/m².
-        Ok(Ok(Corrosion::given(attack, 0.01 * f64::from(chloride.current_ua_cm2))))
+        let given = Corrosion::given(attack, 0.01 * f64::from(chloride.current_ua_cm2));
+        Ok(Ok(given.beside(exposure.classes(), fck)))
     }
 
     /// A line with what runs in the skin of the cubes drawn a hair's breadth into them: there it

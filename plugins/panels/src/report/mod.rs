@@ -8,7 +8,7 @@ mod sheet;
 use bevy_ecs::prelude::*;
 use egui::{Grid, Rect, ScrollArea, Ui, pos2, vec2};
 use intrados_ct::score::Figure;
-use intrados_damage::ledger::Group;
+use intrados_damage::{evidence::called, ledger::Group};
 use intrados_predict::{MemberPrediction, Prediction};
 use intrados_scene::plugin::CurrentScene;
 use intrados_stage::Jobs;
@@ -118,7 +118,7 @@ fn ledger(ui: &mut Ui, result: &Prediction) {
         for group in Group::all(&result.items) {
             let first = group.first();
             ui.label(result.name_of(&first.member));
-            ui.label(first.source);
+            ui.label(called(first.source));
             ui.label(group.name());
             ui.label(format!("{}{}", if first.used { "" } else { "⚠ " }, first.verdict()));
             ui.end_row();
@@ -155,7 +155,7 @@ fn row(
     let said: Vec<String> = member
         .evidence
         .values()
-        .map(|e| format!("{} {}", e.source, plus_minus(e.damage, e.std_error, "")))
+        .map(|e| format!("{} {}", called(e.source), plus_minus(e.damage, e.std_error, "")))
         .collect();
     let basis: Vec<&str> = member.evidence.values().map(|e| e.basis.as_str()).collect();
     let conflict = if member.conflict { "⚠ " } else { "" };

@@ -20,8 +20,8 @@ use crate::{
 
 /// Added to values of members that are not the selected one: they are shown darker.
 const ASIDE: f32 = -10.0;
-/// Added to values that are only foretold: they are shown paler.
-const FORETOLD: f32 = 3.0;
+/// Added to values that are only forecast: they are shown paler.
+const FORECAST: f32 = 3.0;
 /// Share of their brightness.
 const DARKER: f32 = 0.45;
 
@@ -48,7 +48,7 @@ struct Shown {
 #[derive(Clone, PartialEq)]
 struct Key {
     damage: Vec<[Option<f64>; ZONES]>,
-    foretold: Vec<[bool; ZONES]>,
+    forecast: Vec<[bool; ZONES]>,
     selection: Selection,
     camera: Camera,
     size: [usize; 2],
@@ -138,13 +138,13 @@ impl Model {
         let size =
             [rect.width() * density, rect.height() * density].map(|n| (n as usize).clamp(8, 4096));
         // Fine when nobody moves it.
-        let foretold = |member: usize| {
-            latest.member(member).map_or([false; ZONES], |p| p.basis.map(|b| b == Basis::Foretold))
+        let forecast = |member: usize| {
+            latest.member(member).map_or([false; ZONES], |p| p.basis.map(|b| b == Basis::Forecast))
         };
-        let foretold = (0..members).map(foretold).collect();
+        let forecast = (0..members).map(forecast).collect();
         let key = Key {
             damage: (0..members).map(zones).collect(),
-            foretold,
+            forecast,
             selection,
             camera,
             size,
@@ -155,7 +155,7 @@ impl Model {
         }
         let value = |f: &Facet| {
             let damage = key.damage[f.member][f.zone].map_or(f32::NAN, |d| d as f32);
-            let damage = if key.foretold[f.member][f.zone] { damage + FORETOLD } else { damage };
+            let damage = if key.forecast[f.member][f.zone] { damage + FORECAST } else { damage };
             if selection.0.is_some_and(|s| s != f.member) { damage + ASIDE } else { damage }
         };
         let values: Vec<f32> = self.facets.iter().flat_map(|f| [value(f); 3]).collect();
@@ -197,7 +197,7 @@ fn first(positions: &[Vec3], scene: &Scene, [width, height]: [u32; 2]) -> Camera
 fn colour(value: f32) -> [u8; 3] {
     let (value, dim) = if value < 0.5 * ASIDE { (value - ASIDE, DARKER) } else { (value, 1.0) };
     let (value, pale) =
-        if value > 0.5 * FORETOLD { (value - FORETOLD, true) } else { (value, false) };
+        if value > 0.5 * FORECAST { (value - FORECAST, true) } else { (value, false) };
     let rgb = if value.is_nan() {
         colours::UNKNOWN.to_array().first_chunk().copied().unwrap_or([96; 3])
     } else {
@@ -288,10 +288,10 @@ mod tests {
         assert!(bright.iter().zip(dim).all(|(b, d)| d <= *b) && bright != dim);
         let greyness = |rgb: [u8; 3]| rgb.iter().max().unwrap() - rgb.iter().min().unwrap();
         for damage in [0.0, 0.5, 1.0] {
-            let (measured, foretold) = (colour(damage), colour(damage + FORETOLD));
+            let (measured, forecast) = (colour(damage), colour(damage + FORECAST));
             assert!(
-                greyness(foretold) < greyness(measured) && greyness(foretold) > 0,
-                "{measured:?} {foretold:?}"
+                greyness(forecast) < greyness(measured) && greyness(forecast) > 0,
+                "{measured:?} {forecast:?}"
             );
         }
         let [r, g, b] = colour(f32::NAN);

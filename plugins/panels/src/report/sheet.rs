@@ -3,6 +3,7 @@
 
 use egui::{Rect, Sense, Ui, pos2, vec2};
 use intrados_damage::{
+    evidence::called,
     verdict::Basis,
     zone::{ZONES, place},
 };
@@ -87,9 +88,9 @@ fn bars(ui: &mut Ui, predicted: &Predicted) {
             ui.painter().rect_filled(column, 0.0, colours::UNKNOWN.gamma_multiply(0.3));
             continue;
         };
-        let foretold = predicted.basis[zone] == Basis::Foretold;
+        let forecast = predicted.basis[zone] == Basis::Forecast;
         let colour = ColourMap::Viridis.at(r.value as f32);
-        let [red, green, blue] = if foretold { colours::paler(colour) } else { colour };
+        let [red, green, blue] = if forecast { colours::paler(colour) } else { colour };
         let column = Rect::from_min_max(
             pos2(left + 2.0, y(r.value)),
             pos2(left + width - 2.0, rect.bottom()),
@@ -118,7 +119,7 @@ fn bars(ui: &mut Ui, predicted: &Predicted) {
 fn evidence(ui: &mut Ui, told: &MemberPrediction) {
     for (source, e) in &told.evidence {
         ui.horizontal_wrapped(|ui| {
-            ui.strong(*source);
+            ui.strong(called(source));
             ui.label(plus_minus(e.damage, e.std_error, ""));
             ui.label(&e.basis);
         });
@@ -133,7 +134,10 @@ fn evidence(ui: &mut Ui, told: &MemberPrediction) {
         let verdict = if c.exceeded { "⚠ wider than" } else { "within" };
         ui.label(format!(
             "widest crack {:.2} mm ({}), {verdict} the {} mm of {}",
-            c.width_mm, c.source, c.limit_mm, c.exposure
+            c.width_mm,
+            called(c.source),
+            c.limit_mm,
+            c.exposure
         ));
     }
 }

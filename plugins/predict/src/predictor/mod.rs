@@ -40,7 +40,7 @@ use serde::Serialize;
 use crate::{
     CT, Origin, PredictError, PredictSettings, SliceReading,
     compared::score,
-    defect::defects,
+    defect::has_defects,
     limits::limits,
     prediction::{MemberPrediction, MissingEvidence, Prediction, SCHEMA},
     section,
@@ -228,7 +228,7 @@ impl Predictor {
             }
             Some(Item::Slice(_)) => format!("reading slice {} of {slices}", self.next + 1),
             Some(Item::Life(_)) => self.label_of(&self.lives()),
-            Some(Item::Gauges(_)) => "what gauges felt".into(),
+            Some(Item::Gauges(_)) => "what strain gauges say".into(),
             Some(Item::Survey(_)) => "what was surveyed".into(),
             Some(Item::Photograph(..)) => "what a photograph shows".into(),
             Some(Item::Outside(source, ..)) => format!("what {} says", source.name()),
@@ -613,7 +613,7 @@ impl Predictor {
         };
         let nothing = Shown::default();
         let photographed = self.photographed.get(&member).unwrap_or(&nothing);
-        !defects(scene, &m.id, photographed, readings).is_empty()
+        has_defects(scene, &m.id, photographed, readings)
     }
 
     /// The prediction from what is done so far.

@@ -25,8 +25,7 @@ use crate::{
     basis::Basis,
     surface::concrete,
     words::{
-        NOTHING, bad_probability, defect, due, finding, level, matters, metres, state, word,
-        worse_half,
+        NOTHING, bad_probability, defect, due, finding, level, matters, metres, word, worse_half,
     },
 };
 
@@ -226,7 +225,7 @@ impl Teller<'_> {
         lines.push(format!("Damage: {damage} (0 sound, 1 lost)"));
         let bad: Vec<&str> =
             worse_half(&self.prediction.profile).iter().map(|s| s.name.as_str()).collect();
-        lines.push(format!("State: {}; {likely:.0} % {}", state(m), bad.join(" or ")));
+        lines.push(format!("State: {}; {likely:.0} % {}", m.state, bad.join(" or ")));
         lines.push(format!("To do: {}", m.advice));
         lines.push(format!("When: {}", due(m, self.basis)));
         lines.join("\n")

@@ -35,8 +35,8 @@ fn predicted(exposure: &str) -> (Scene, Prediction) {
 fn salt_without_numbers_is_assumed_with_its_spread() {
     let (scene, prediction) = predicted("exposure: (class: \"XC4, XD3\", years: 30)");
     let member = &prediction.members[0];
-    assert_eq!(member.basis, Basis::Foretold);
-    assert!(member.state.starts_with("foretold between"), "{}", member.state);
+    assert_eq!(member.basis, Basis::Forecast);
+    assert!(member.state.starts_with("forecast: between"), "{}", member.state);
     assert!(
         member.advice.starts_with("Inspect") && !member.advice.contains("No action"),
         "{}",
@@ -74,7 +74,7 @@ fn salt_without_numbers_is_assumed_with_its_spread() {
     assert!(!read("report.html").contains("Sauvola"));
     assert!(!read("report.html").contains("foretold"));
     assert!(
-        read("members.csv").contains(",foretold,")
+        read("members.csv").contains(",forecast,")
             && read("members.csv").contains("assumed by exposure class")
     );
     assert!(read("damage.vtu").contains("measured"));
@@ -82,7 +82,7 @@ fn salt_without_numbers_is_assumed_with_its_spread() {
     let p = json["members"][0]["state_probability"].as_object().unwrap();
     assert!(
         (p.values().map(|v| v.as_f64().unwrap()).sum::<f64>() - 1.0).abs() < 1e-9
-            && json["members"][0]["basis"] == "foretold"
+            && json["members"][0]["basis"] == "forecast"
     );
 }
 
