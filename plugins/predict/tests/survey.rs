@@ -44,7 +44,9 @@ fn every_item_is_in_the_ledger_and_readings_move_what_they_speak_of() {
         item("pot", 0.45, "HalfCell(mv: -420)"),
         item("split", 0.45, "Crack(width_mm: 0.8, course: Along)"),
     ];
-    let sound = [item("pot", 0.45, "HalfCell(mv: -90)"), item("look", 0.45, "Intact")];
+    // All around, since one face says little of the others.
+    let look = "(member: \"C1\", name: \"look\", along: 0.45, shows: Intact)".to_owned();
+    let sound = [item("pot", 0.45, "HalfCell(mv: -90)"), look];
     let [bad, good] = [rusts, sound].map(|items| predicted("XC4, XD3", &items.join(", ")));
     for prediction in [&bad, &good] {
         assert!(prediction.items.iter().all(|i| i.used && i.source == "survey"));
