@@ -182,7 +182,7 @@ impl FusionRule {
 
     /// What a source is blind to within a cause.
     #[must_use]
-    pub(crate) fn blind(&self, source: &str, cause: Cause) -> f64 {
+    pub fn blind(&self, source: &str, cause: Cause) -> f64 {
         self.blindness.iter().find(|b| b.0 == source && b.1 == cause).map_or(0.0, |b| b.2)
     }
 

@@ -121,6 +121,8 @@ pub struct Strength {
 /// Share of the peak at which a member counts as failed (the usual definition of ultimate
 /// displacement: Park 1989 takes .8).
 pub const FAILED: f64 = 0.8;
+/// Share of the peak from which on its mode is told by what happened since.
+const FALLS: f64 = 0.9;
 /// Share of the peak at which it is followed no further.
 const SPENT: f64 = 0.78;
 /// How far the first step goes, over the longest measure of the member.
@@ -131,6 +133,9 @@ const GROWTH: f64 = 1.5;
 const SOFT: f64 = 0.85;
 /// Short steps, over how far it has moved.
 const SHORT: f64 = 0.04;
+/// Work after the peak over that up to it, and work that is always allowed, as
+/// [`MarchSettings::work`] counts it: what falls apart has many equilibria to choose from.
+const WORK: [f64; 2] = [1.0, 5e7];
 /// Steps, at most.
 const STEPS: usize = 400;
 /// It is followed no further than so many times the displacement at the first yielding.
@@ -200,7 +205,7 @@ pub(crate) fn raise(
     // An arc counts all nodes.
     let mut unit = if arc_only { nodes(structure).sqrt() } else { 1.0 };
     let (mut step, mut stiffness, mut is_arc) = (FIRST * length, None, arc_only);
-    let mut ended = format!("{STEPS} steps were taken");
+    let (mut ended, mut at_peak) = (format!("{STEPS} steps were taken"), 0.0);
     for _ in 0..STEPS {
         job.check()?;
         // A second a step, for whoever looks at the pictures.
@@ -219,14 +224,23 @@ pub(crate) fn raise(
                 unit = nodes(structure).sqrt();
                 step *= 0.25;
                 march = March::new(structure, march.history, by_arc.clone(), settings);
+                at_peak = 0.0;
                 continue;
             }
-            Err(why @ (Failure::NotConverged { .. } | Failure::Solve(_) | Failure::Laborious)) => {
+            Err(Failure::Laborious) => {
+                ended = "following it further took more work than all up to its peak".into();
+                break;
+            }
+            Err(why @ (Failure::NotConverged { .. } | Failure::Solve(_))) => {
                 ended = why.to_string();
                 break;
             }
             Err(other) => return Err(other),
         }
+        if watch.peak + 1 == watch.curve.len() {
+            at_peak = march.spent();
+        }
+        march.limit(at_peak + (WORK[0] * at_peak).max(WORK[1]));
         if let Some(why) = watch.is_spent(length) {
             ended = why;
             break;
@@ -427,7 +441,12 @@ impl<'a, 'm> Watch<'a, 'm> {
             .zip(yielding)
             .map(|(u, y)| u.displacement_m / y.displacement_m)
             .filter(|d| *d >= 1.0);
-        let (mode, because) = self.mode(ultimate.is_some(), job)?;
+        let falls = |p: &CurvePoint| {
+            p.load_factor - self.curve[0].load_factor
+                < FALLS * (peak.load_factor - self.curve[0].load_factor)
+        };
+        let has_failed = self.curve[self.peak..].iter().any(falls);
+        let (mode, because) = self.mode(has_failed, job)?;
         Ok(Strength {
             loads: self
                 .raised

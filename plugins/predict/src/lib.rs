@@ -20,6 +20,5 @@ pub use limits::doubted;
 pub use plugin::{PredictPlugin, Predicted, Predicting, Progress};
 pub use prediction::{CrackCheck, MemberPrediction, MissingEvidence, Prediction, Truth};
 pub use predictor::{Predictor, predict};
-pub(crate) use section::CT;
-pub use section::{SliceReading, SliceTruth};
+pub use section::{CT, SliceReading, SliceTruth};
 pub use settings::PredictSettings;

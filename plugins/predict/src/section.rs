@@ -26,7 +26,7 @@ use serde_json::json;
 use crate::{PredictError, PredictSettings};
 
 /// The source name of evidence from CT slices.
-pub(crate) const CT: &str = "ct";
+pub const CT: &str = "ct";
 
 /// Smallest standard error of a damage read from slices: what noise alone does to a section without
 /// damage.

@@ -343,6 +343,17 @@ impl<'s, 'm> March<'s, 'm> {
         self.way.system.solver.as_ref().is_some_and(Solver::fell_back)
     }
 
+    /// Work so far, as [`MarchSettings::work`] counts it.
+    #[must_use]
+    pub(crate) fn spent(&self) -> f64 {
+        self.way.spent
+    }
+
+    /// From now on all steps together, those so far included, may take so much.
+    pub(crate) fn limit(&mut self, work: f64) {
+        self.way.settings.work = work;
+    }
+
     /// To the time `to`, by as few steps as converge; under [`Drive::Raised`] the controlled
     /// displacement grows by `amount` on the way. `each` hears every equilibrium.
     ///
