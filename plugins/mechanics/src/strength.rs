@@ -207,10 +207,13 @@ pub(crate) fn raise(
     let (mut step, mut stiffness, mut is_arc) = (FIRST * length, None, arc_only);
     let (mut ended, mut at_peak) = (format!("{STEPS} steps were taken"), 0.0);
     for _ in 0..STEPS {
-        job.check()?;
+        // How many steps it takes nobody knows.
+        let share = watch.curve.len() as f64 / STEPS as f64;
+        job.step(watch.curve.len().min(STEPS), STEPS)?;
+        let within = job.part(share, share);
         // A second a step, for whoever looks at the pictures.
         let time = march.history.time + 1.0;
-        let went = march.advance(time, step * unit, job, |history, step| {
+        let went = march.advance(time, step * unit, &within, |history, step| {
             let points = structure.all_points(history)?;
             watch.see(history, step, &points);
             each(history, step, &points)

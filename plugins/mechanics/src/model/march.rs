@@ -625,8 +625,8 @@ impl Aim {
 
     /// How much is missing of what the controlled displacement is to grow by.
     fn missing(&self, x: &[f64]) -> f64 {
-        let grown: f64 = self.row.iter().map(|&(i, w)| w * (x[i] - self.begin[i])).sum();
-        self.amount - grown
+        let controlled = |x: &[f64]| self.row.iter().map(|&(i, w)| w * x[i]).sum::<f64>();
+        controlled(&self.begin) + self.amount - controlled(x)
     }
 
     /// What is out of balance at `x`; `scale` keeps the largest of all that has acted in this step.
