@@ -11,12 +11,12 @@ use intrados_mechanics::{
     deck::Case,
     frame::Whole,
     material::law::Cracks,
-    member::{MemberError, Meshing, Prepared, prepare_within},
+    member::{Along, MemberError, Meshing, Prepared, prepare_within},
     mesh::voxel::VoxelError,
     model::{self, MarchSettings, Regularisation},
     read::{self, ReadError},
     skin::{Looking, Seen},
-    strength::{Along, CurvePoint, Strength},
+    strength::{CurvePoint, Strength},
 };
 use intrados_scene::{Assembly, Scene, SurfaceDamage, SurfaceFile};
 use intrados_stage::{

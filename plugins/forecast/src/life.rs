@@ -18,14 +18,14 @@ use intrados_damage::{
     zone::{ZONES, Zones, place, together, zone_at},
 };
 use intrados_mechanics::{
-    analysis::{MemberOutcome, Observer, analyze, past_peak},
+    analysis::{MemberOutcome, Observer, analyze},
     element::rod::Piece,
     material::{
         concrete::{Class, secant_modulus, tensile_strength},
         durability::{Bars, Corrosion, CorrosionError, Lost},
     },
     member::{Handed, Meshing, Part, Prepared, largest_element, prepare_within},
-    model::{Failure, Gauge, History, MarchSettings, Point, SteelKind, Step, System},
+    model::{Failure, Gauge, History, MarchSettings, Point, SteelKind, Step, System, past_peak},
 };
 use intrados_scene::{Assembly, Frame, MemberKind, Scene, structure::Body};
 use intrados_stage::{

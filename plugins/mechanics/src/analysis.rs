@@ -16,7 +16,7 @@ use crate::{
     member::{Part, Prepared},
     model::{
         CONDUCTED, Drive, Failure, History, March, MarchSettings, Point, Steel, SteelKind, Step,
-        System,
+        System, past_peak,
     },
     strength::{self, CurvePoint, Strength},
     tensor::{Principal, Voigt, rotate_stress},
@@ -188,8 +188,6 @@ impl Observer for () {
     }
 }
 
-/// Compressive damage at the peak of the curve is no damage yet; what counts is beyond it.
-const HARDENING: f64 = 0.35;
 /// Damage from which a volume counts as damaged.
 const DAMAGED: f64 = 0.5;
 
@@ -331,12 +329,6 @@ fn factor(prepared: &Prepared, time: f64) -> f64 {
         .filter(|l| l.name != CONDUCTED)
         .map(|l| l.factor(time))
         .fold(0.0, f64::max)
-}
-
-/// Damage (of tension, of compression) that is past the peak of its curve.
-#[must_use]
-pub fn past_peak([tension, compression]: [f64; 2]) -> f64 {
-    tension.max((compression - HARDENING).max(0.0) / (1.0 - HARDENING))
 }
 
 impl MemberOutcome {

@@ -10,11 +10,11 @@ use glam::{DVec3, Vec3};
 use intrados_scene::{CrackSurface, Mouth, Spalled, SurfaceDamage};
 
 use crate::{
-    analysis::{Observer, past_peak},
+    analysis::Observer,
     element::hex8,
     member::Prepared,
     mesh::{HexFace, hex::FACES},
-    model::{Failure, History, Point, SteelKind, Step, System},
+    model::{Failure, History, Point, SteelKind, Step, System, past_peak},
     tensor::Principal,
 };
 

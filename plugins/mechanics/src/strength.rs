@@ -9,34 +9,12 @@ use intrados_stage::Job;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    analysis::past_peak,
-    member::Prepared,
+    member::{Along, Prepared, Raised},
     model::{
         Action, Control, Drive, Failure, History, March, MarchSettings, Point, SteelKind, Step,
-        System,
+        System, past_peak,
     },
 };
-
-/// Loads that are raised, and along what.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Raised {
-    /// Which, of the model's.
-    pub loads: Vec<usize>,
-    /// Along what.
-    pub along: Along,
-}
-
-/// What grows from step to step.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub enum Along {
-    /// The displacement of the loaded nodes; the arc where that finds nothing more.
-    #[default]
-    Automatic,
-    /// The displacement of the loaded nodes, up to so much, m.
-    Displacement(Option<f64>),
-    /// The arc of all displacements.
-    ArcLength,
-}
 
 /// How a member fails.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

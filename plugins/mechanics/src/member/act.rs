@@ -5,13 +5,12 @@ use std::collections::BTreeMap;
 use glam::DVec3;
 use intrados_scene::structure::{self, Body as Shape, GroundModel, Hold, Place};
 
-use super::{Draft, MemberError, body::LINING, raised_by, warmth::Air};
+use super::{Along, Draft, MemberError, Raised, body::LINING, raised_by, warmth::Air};
 use crate::{
     element::spring::Winkler,
     material::{DAY, YEAR},
     mesh::HexFace,
     model::{Action, Bedding, Ground, JACKING, Load, SteelKind},
-    strength::{Along, Raised},
 };
 
 /// How long the ground takes to press on a lining, s.

@@ -36,7 +36,6 @@ use crate::{
     },
     model::{Failure, Gauge, Model},
     prestress::PrestressError,
-    strength::{Along, Raised},
 };
 
 /// How finely a member is cut.
@@ -76,6 +75,27 @@ pub struct Prepared {
     pub attacked: f64,
     /// What a user should know: assumptions, and what was left out.
     pub notes: Vec<String>,
+}
+
+/// Loads that are raised, and along what.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Raised {
+    /// Which, of the model's.
+    pub loads: Vec<usize>,
+    /// Along what.
+    pub along: Along,
+}
+
+/// What grows from step to step.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum Along {
+    /// The displacement of the loaded nodes; the arc where that finds nothing more.
+    #[default]
+    Automatic,
+    /// The displacement of the loaded nodes, up to so much, m.
+    Displacement(Option<f64>),
+    /// The arc of all displacements.
+    ArcLength,
 }
 
 impl Prepared {

@@ -158,6 +158,14 @@ pub enum Action {
     Temperature(Vec<f64>),
 }
 
+/// Compressive damage at the peak of the curve is no damage yet; what counts is beyond it.
+const HARDENING: f64 = 0.35;
+/// Damage (of tension, of compression) that is past the peak of its curve.
+#[must_use]
+pub fn past_peak([tension, compression]: [f64; 2]) -> f64 {
+    tension.max((compression - HARDENING).max(0.0) / (1.0 - HARDENING))
+}
+
 /// Name of loads that are temperatures found by conduction, one a moment.
 pub const CONDUCTED: &str = "conducted heat";
 

@@ -9,9 +9,10 @@ use intrados_mechanics::{
     Meshing,
     analysis::Observer,
     analyze,
+    member::Along,
     model::{Failure, History, Point, Step},
     prepare,
-    strength::{Along, Strength},
+    strength::Strength,
 };
 use intrados_scene::Scene;
 
