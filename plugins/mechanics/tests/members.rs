@@ -9,6 +9,7 @@ use intrados_mechanics::{
     material::{YEAR, chloride::Ingress},
     member::{Meshing, Prepared, prepare},
     model::{Action, CONDUCTED, Gauge, MarchSettings, SteelKind, System},
+    strength::Mode,
 };
 use intrados_scene::{
     Frame, Member, MemberKind, Mesh, Object, Part, Scene, Structure,
@@ -617,4 +618,46 @@ fn cubes_that_miss_the_volume_are_made_smaller_or_refused() {
     assert!(geometry.relative_volume().abs() < 0.02, "{geometry:?}");
     let why = fill(0.03, 0.5).map(drop).unwrap_err().to_string();
     assert!(why.contains("no cube") && why.contains("choose a smaller edge"), "{why}");
+}
+
+/// Half of a beam with two bars of 12 mm, its middle at the end of the axis: they yield at M = A_s
+/// f_y z, z by the block of stresses that they need, and go on yielding. Bricks of 100 mm, four over
+/// the depth, give the compressed zone a longer arm. Or it is moved as far as was asked for.
+#[test]
+fn a_beam_is_raised_until_its_bars_have_yielded() {
+    let raised = |loading: &str| {
+        let scene = from_text(&format!(
+            "members: [(id: \"B\", at: (0, 0, 0), concrete: \"C30/37\", body: Beam(section: Rectangle(width_m: 0.2, depth_m: 0.4), length_m: 1.1,
+                reinforcement: (cover_mm: 35, bars: [Row(side_deg: 180, count: 2, diameter_mm: 12)], stirrups: (diameter_mm: 8, spacing_mm: 100))))],
+             supports: [(member: \"B\", place: Surface(from: 0.0909, to: 0.0909, side_deg: 180), hold: Directions(x: false, y: true, z: true)),
+                (member: \"B\", place: End, hold: Directions(x: true, y: false, z: false))],
+             loads: [(name: \"jack\", action: Force(place: Surface(from: 0.9, to: 1, side_deg: 0), force_kn: (0, -10, 0)), history: [(28, 0)], loading: {loading})]"
+        ));
+        let prepared = prepare(
+            &scene,
+            &scene.structure.assemblies[0],
+            Meshing { element: Some(0.1) },
+            &Job::default(),
+        )
+        .unwrap();
+        let life =
+            analyze(&prepared, MarchSettings::of_life(), &Job::default(), &mut ()).unwrap().0;
+        life.strength.unwrap()
+    };
+    let [steel, depth, arm] = [2.0 * 113.1e-6 * 500e6, 0.4 - 0.049, 1.05 - 0.1];
+    let by_hand = steel * (depth - 0.5 * steel / (38e6 * 0.2)) / arm;
+    let found = raised("Automatic");
+    let yields = found.yielding.expect("its bars yield").load_n / by_hand;
+    assert!((0.85..1.2).contains(&yields), "{yields} {}", found.because);
+    let peak = found.peak.load_n / by_hand;
+    assert!((1.0..1.3).contains(&peak), "{peak} {}", found.because);
+    // With so few bars they break where the one crack is, long after they have yielded.
+    assert_eq!(found.mode, Mode::BarRupture, "{} {}", found.because, found.ended);
+    let yielding = found.yielding.map_or(f64::NAN, |y| y.displacement_m);
+    assert!(found.peak.displacement_m / yielding > 2.0, "{yielding} {:?}", found.peak);
+    assert!(found.loads == ["jack"] && found.curve.len() > 20, "{}", found.ended);
+    let far = raised("Displacement(to_mm: 2)");
+    assert!(far.ended.contains("2.0 mm asked for"), "{}", far.ended);
+    let last = far.curve[far.curve.len() - 1];
+    assert!((last.displacement_m.abs() - 2e-3).abs() < 1e-6, "{last:?}");
 }
