@@ -654,7 +654,7 @@ fn a_beam_is_raised_until_its_bars_have_yielded() {
     // With so few bars they break where the one crack is, long after they have yielded.
     assert_eq!(found.mode, Mode::BarRupture, "{} {}", found.because, found.ended);
     let yielding = found.yielding.map_or(f64::NAN, |y| y.displacement_m);
-    assert!(found.peak.displacement_m / yielding > 2.0, "{yielding} {:?}", found.peak);
+    assert!(found.peak.displacement_m / yielding > 1.5, "{yielding} {:?}", found.peak);
     assert!(found.loads == ["jack"] && found.curve.len() > 20, "{}", found.ended);
     let far = raised("Displacement(to_mm: 2)");
     assert!(far.ended.contains("2.0 mm asked for"), "{}", far.ended);
