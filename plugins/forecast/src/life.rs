@@ -303,8 +303,10 @@ fn prepared(
             .then(|| (FINEST * smallest).max((member.volume / BRICKS).cbrt()).min(most))
     };
     let meshing = Meshing { element: settings.element_m.or_else(edge) };
-    prepare_within(scene, assembly, handed, meshing, job)
-        .map_err(|e| if job.is_cancelled() { ForecastError::Cancelled } else { because(&e) })
+    let prepared = prepare_within(scene, assembly, handed, meshing, job)
+        .map_err(|e| if job.is_cancelled() { ForecastError::Cancelled } else { because(&e) })?;
+    // What it would be like once it has failed is no damage that it has.
+    Ok(Prepared { raised: None, ..prepared })
 }
 
 /// The bars of a model's members, and what attacks them.

@@ -19,7 +19,7 @@ use intrados_stage::Job;
 
 use crate::{
     element::{ElementError, embed::EmbedError, hex8::Kind, load},
-    material::durability::CorrosionError,
+    material::{durability::CorrosionError, steel::Bar},
     member::{Part, Prepared},
     mesh::{ElementId, HexFace, Locator, Mesh},
     model::{
@@ -447,7 +447,7 @@ fn matter(material: &Material, kind: SectionKind) -> Result<Matter, DeckError> {
         SectionKind::Solid => Matter::Elastic(elastic),
         SectionKind::Shell { thickness } => Matter::Shell { elastic, thickness },
         SectionKind::Rod { area } => {
-            Matter::Bar { steel: steel::elastic(modulus), area, expansion, density }
+            Matter::Bar { steel: Bar::elastic(modulus), area, expansion, density }
         }
     })
 }

@@ -54,10 +54,6 @@ pub(crate) struct Limits {
 
 impl Limits {
     pub(crate) fn new(structure: &System) -> Self {
-        let nodes = &structure.model.mesh.nodes;
-        let (low, high) = nodes
-            .iter()
-            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), &p| (l.min(p), h.max(p)));
         let elastic = structure
             .model
             .bodies
@@ -65,7 +61,7 @@ impl Limits {
             .all(|b| matches!(b.matter, Matter::Elastic(_) | Matter::Shell { .. }));
         let elastic = elastic && structure.model.steel.is_empty();
         Self {
-            length: (high - low).max_element(),
+            length: longest(structure),
             elastic,
             looked: [0.0; 2],
             nearest: None,
@@ -164,6 +160,11 @@ impl Limits {
         }
         (warnings, notes)
     }
+}
+
+/// Longest measure of a model, m.
+pub(crate) fn longest(structure: &System) -> f64 {
+    structure.model.mesh.bounds().map_or(0.0, |[low, high]| (high - low).max_element())
 }
 
 /// How far nodes are from where the whole has moved on average, at most, m: a footing that sinks

@@ -9,6 +9,7 @@ use intrados_stage::Job;
 use serde::{Deserialize, Serialize};
 
 use crate::{
+    limits::longest,
     member::{Along, Prepared, Raised},
     model::{
         Action, Control, Drive, Failure, History, March, MarchSettings, Point, SteelKind, Step,
@@ -126,6 +127,8 @@ const FAR: f64 = 0.1;
 const OBLIQUE: [f64; 2] = [20.0, 70.0];
 /// Damage of compression past its peak from which concrete counts as crushed.
 const CRUSHED: f64 = 0.3;
+/// Loads over those of elastic buckling at the peak, from which that is what ends it.
+const BUCKLES: f64 = 0.5;
 
 /// How equilibria are found while loads are raised, from how they are found in a life: many cracks
 /// grow in every step, and the last per mille costs most.
@@ -144,13 +147,18 @@ struct Watch<'a, 'm> {
     begin: f64,
     /// Factor of the loads then.
     base: f64,
+    /// Sum of their resultants at factor 1, N; 0: displacements are prescribed.
+    forces: f64,
     curve: Vec<CurvePoint>,
     yielding: Option<(CurvePoint, String)>,
-    /// At the peak: number in the curve, cracks' openings and damage of compression by point.
+    /// Number of the peak in the curve.
     peak: usize,
+    /// What there was to see at the peak.
     at_peak: Vec<[Point; 8]>,
     history_at_peak: Option<History>,
+    /// What there is to see now.
     last: Vec<[Point; 8]>,
+    /// What broke first.
     broken: Option<(Mode, String)>,
 }
 
@@ -244,13 +252,16 @@ fn share_of(structure: &System, load: usize, time: f64) -> f64 {
     if factor == 0.0 { 1.0 } else { factor }
 }
 
-fn nodes(structure: &System) -> f64 {
-    structure.model.mesh.nodes.len() as f64
+/// Resultant of an action at factor 1, N.
+fn resultant(structure: &System, action: &Action, time: f64) -> Result<f64, Failure> {
+    let mut forces = vec![0.0; structure.unknowns()];
+    structure.add_load(action, 1.0, time, &mut forces)?;
+    let each = forces.as_chunks::<3>().0.iter().map(|f| glam::DVec3::from_array(*f));
+    Ok(each.sum::<glam::DVec3>().length())
 }
 
-/// Longest measure of a model, m.
-fn longest(structure: &System) -> f64 {
-    structure.model.mesh.bounds().map_or(0.0, |[low, high]| (high - low).max_element())
+fn nodes(structure: &System) -> f64 {
+    structure.model.mesh.nodes.len() as f64
 }
 
 impl<'a, 'm> Watch<'a, 'm> {
@@ -260,7 +271,7 @@ impl<'a, 'm> Watch<'a, 'm> {
         raised: &'a Raised,
         history: &History,
     ) -> Result<Self, Failure> {
-        let (mut pull, mut base) = (vec![0.0; structure.unknowns()], 0.0_f64);
+        let (mut pull, mut base, mut forces) = (vec![0.0; structure.unknowns()], 0.0_f64, 0.0);
         for &load in &raised.loads {
             let share = share_of(structure, load, history.time);
             let action = &structure.model.loads[load].action;
@@ -271,6 +282,7 @@ impl<'a, 'm> Watch<'a, 'm> {
                     .for_each(|&(n, c, v)| pull[3 * n as usize + usize::from(c)] += share * v);
             }
             base = base.max(structure.model.loads[load].factor(history.time).abs());
+            forces += resultant(structure, action, history.time)?;
         }
         let all: f64 = pull.iter().map(|p| p.abs()).sum();
         let row = pull.iter().enumerate().filter(|(_, p)| **p != 0.0);
@@ -282,6 +294,7 @@ impl<'a, 'm> Watch<'a, 'm> {
             row,
             begin: 0.0,
             base: if base == 0.0 { 0.0 } else { 1.0 },
+            forces,
             curve: Vec::new(),
             yielding: None,
             peak: 0,
@@ -308,28 +321,19 @@ impl<'a, 'm> Watch<'a, 'm> {
             .iter()
             .map(|&(n, c, w)| w.signum() * history.force[3 * n as usize + usize::from(c)])
             .sum();
-        let forces: f64 = self.raised.loads.iter().map(|&l| self.resultant(l, history.time)).sum();
         CurvePoint {
             displacement_m: self.displacement(history) - self.begin,
             load_factor,
-            load_n: if forces > 0.0 { load_factor * forces } else { taken },
+            load_n: if self.forces > 0.0 { load_factor * self.forces } else { taken },
             residual,
         }
     }
 
-    /// Resultant of a load at factor 1, N.
-    fn resultant(&self, load: usize, time: f64) -> f64 {
-        let mut forces = vec![0.0; self.structure.unknowns()];
-        let of = &self.structure.model.loads[load];
-        if self.structure.add_load(&of.action, 1.0, time, &mut forces).is_err() {
-            return 0.0;
-        }
-        let sum = forces
-            .as_chunks::<3>()
-            .0
-            .iter()
-            .fold(glam::DVec3::ZERO, |sum, f| sum + glam::DVec3::from_array(*f));
-        sum.length()
+    /// Whether the load of a point has fallen below a share of the peak, both counted from where
+    /// loads began to be raised.
+    fn has_fallen(&self, point: &CurvePoint, share: f64) -> bool {
+        let risen = |p: &CurvePoint| p.load_factor - self.curve[0].load_factor;
+        risen(point) < share * risen(&self.curve[self.peak])
     }
 
     fn see(&mut self, history: &History, step: &Step, points: &[[Point; 8]]) {
@@ -368,10 +372,7 @@ impl<'a, 'm> Watch<'a, 'm> {
         if let Some((mode, name)) = &self.broken {
             return Some(format!("{}: {name}", mode.words()));
         }
-        if now.load_factor - self.curve[0].load_factor
-            < SPENT * (peak.load_factor - self.curve[0].load_factor)
-            && peak.load_factor > self.curve[0].load_factor
-        {
+        if self.has_fallen(&now, SPENT) && peak.load_factor > self.curve[0].load_factor {
             return Some(format!("the load has fallen below {SPENT} of its peak"));
         }
         let at_peak = peak.displacement_m.abs();
@@ -412,21 +413,14 @@ impl<'a, 'm> Watch<'a, 'm> {
     /// What it comes to.
     fn tell(self, ended: String, job: &Job) -> Result<Strength, Failure> {
         let peak = self.curve[self.peak];
-        let failed = |p: &&CurvePoint| {
-            p.load_factor - self.curve[0].load_factor
-                < FAILED * (peak.load_factor - self.curve[0].load_factor)
-        };
-        let ultimate = self.curve[self.peak..].iter().find(failed).copied();
+        let after = &self.curve[self.peak..];
+        let ultimate = after.iter().find(|p| self.has_fallen(p, FAILED)).copied();
         let yielding = self.yielding.as_ref().map(|y| y.0);
         let ductility = ultimate
             .zip(yielding)
             .map(|(u, y)| u.displacement_m / y.displacement_m)
             .filter(|d| *d >= 1.0);
-        let falls = |p: &CurvePoint| {
-            p.load_factor - self.curve[0].load_factor
-                < FALLS * (peak.load_factor - self.curve[0].load_factor)
-        };
-        let has_failed = self.curve[self.peak..].iter().any(falls);
+        let has_failed = after.iter().any(|p| self.has_fallen(p, FALLS));
         let (mode, because) = self.mode(has_failed, job)?;
         Ok(Strength {
             loads: self
@@ -554,6 +548,3 @@ impl<'a, 'm> Watch<'a, 'm> {
         })
     }
 }
-
-/// Loads over those of elastic buckling at the peak, from which that is what ends it.
-const BUCKLES: f64 = 0.5;

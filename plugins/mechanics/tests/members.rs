@@ -28,6 +28,12 @@ fn prepared(scene: &str, id: &str, element: f64) -> Prepared {
     .unwrap()
 }
 
+/// The first assembly of a scene.
+fn first(scene: &Scene, element: f64) -> Prepared {
+    let meshing = Meshing { element: Some(element) };
+    prepare(scene, &scene.structure.assemblies[0], meshing, &Job::default()).unwrap()
+}
+
 /// C1 carries 1.6 MN and its own weight: the foot bears just that, and in the course of 35 years
 /// concrete hands over to the bars as the age-adjusted modulus foresees (some −7 MPa and −200 MPa;
 /// AAEM with φ = 2.2 and ε_sh = −4e-4).
@@ -211,13 +217,7 @@ fn imported_on(upright: u32, open: bool) -> Scene {
 fn an_imported_pier_stands_on_its_springs() {
     let scene = imported(false);
     assert_eq!(scene.structure.assemblies.len(), 1);
-    let mut prepared = prepare(
-        &scene,
-        &scene.structure.assemblies[0],
-        Meshing { element: Some(0.2) },
-        &Job::default(),
-    )
-    .unwrap();
+    let mut prepared = first(&scene, 0.2);
     assert_eq!(prepared.model.mesh.hexes.len(), 2 * 2 * 10);
     prepared.times.truncate(2);
     let (outcome, history) =
@@ -243,13 +243,7 @@ fn an_imported_pier_stands_on_its_springs() {
 #[test]
 fn an_imported_pier_on_soft_springs_topples() {
     let scene = imported_on(100, false);
-    let mut prepared = prepare(
-        &scene,
-        &scene.structure.assemblies[0],
-        Meshing { element: Some(0.2) },
-        &Job::default(),
-    )
-    .unwrap();
+    let mut prepared = first(&scene, 0.2);
     prepared.times.truncate(2);
     let (outcome, _) =
         analyze(&prepared, MarchSettings::default(), &Job::default(), &mut ()).unwrap();
@@ -350,13 +344,7 @@ fn warm_air_heats_a_lining_through() {
          supports: [(member: \"T\", place: Start, hold: Directions(x: false, y: false, z: true))],
          loads: [(name: \"air\", action: Air(inside_k: 20), history: [(3, 0), (4, 1), (60, 1)])]",
     );
-    let prepared = prepare(
-        &scene,
-        &scene.structure.assemblies[0],
-        Meshing { element: Some(0.1) },
-        &Job::default(),
-    )
-    .unwrap();
+    let prepared = first(&scene, 0.1);
     let fields = conducted(&prepared);
     let (time, last) = fields[fields.len() - 1];
     assert!((time / 86_400.0 - 60.0).abs() < 1e-9 && fields[0].1.iter().all(|t| t.abs() < 1e-6));
@@ -381,13 +369,7 @@ fn hydration_warms_a_thick_column() {
         )
     };
     let heated = from_text(&text(", hydration: Some((cement_kg_m3: 400))"));
-    let prepared = prepare(
-        &heated,
-        &heated.structure.assemblies[0],
-        Meshing { element: Some(0.3) },
-        &Job::default(),
-    )
-    .unwrap();
+    let prepared = first(&heated, 0.3);
     let fields = conducted(&prepared);
     let core = prepared
         .model
@@ -423,13 +405,7 @@ fn hydration_warms_a_thick_column() {
         outcome.members[0].peak_tension_pa
     };
     let cold = from_text(&text(""));
-    let cold = prepare(
-        &cold,
-        &cold.structure.assemblies[0],
-        Meshing { element: Some(0.3) },
-        &Job::default(),
-    )
-    .unwrap();
+    let cold = first(&cold, 0.3);
     assert!(conducted(&cold).is_empty());
     let (with, without) = (peak(&prepared), peak(&cold));
     assert!(with > 1.2 * without, "{with} {without}");
@@ -451,13 +427,7 @@ fn a_grade_is_what_bars_are_made_of() {
     let pull = "(name: \"N\", action: Force(place: End, force_kn: (0, 1400, 0)), history: [(28, 0), (28.1, 1)])";
     let yields = |more: &str| {
         let scene = column(1.0, more, pull);
-        let prepared = prepare(
-            &scene,
-            &scene.structure.assemblies[0],
-            Meshing { element: Some(0.2) },
-            &Job::default(),
-        )
-        .unwrap();
+        let prepared = first(&scene, 0.2);
         let bars = prepared.model.steel.iter().map(|s| {
             if let SteelKind::Bar(bar) = &s.kind { [bar.yielding, bar.hardening] } else { [0.0; 2] }
         });
@@ -484,13 +454,7 @@ fn a_column_beyond_eulers_load_has_no_equilibrium() {
             -newton / 1e3
         );
         let scene = column(14.0, "", &loads);
-        let prepared = prepare(
-            &scene,
-            &scene.structure.assemblies[0],
-            Meshing { element: Some(0.2) },
-            &Job::default(),
-        )
-        .unwrap();
+        let prepared = first(&scene, 0.2);
         analyze(&prepared, MarchSettings::of_life(), &Job::default(), &mut ()).unwrap().0
     };
     let over = life(1.6e6);
@@ -529,13 +493,7 @@ fn what_moves_by_a_twentieth_of_its_length_has_failed() {
     );
     let springs = Hold::Springs { stiffness_mpa_m: Vec3::splat(2.0), lifts: false };
     Arc::make_mut(&mut scene.structure).supports[0].hold = springs;
-    let prepared = prepare(
-        &scene,
-        &scene.structure.assemblies[0],
-        Meshing { element: Some(0.2) },
-        &Job::default(),
-    )
-    .unwrap();
+    let prepared = first(&scene, 0.2);
     let (outcome, _) =
         analyze(&prepared, MarchSettings::of_life(), &Job::default(), &mut ()).unwrap();
     let last = outcome.steps.last().unwrap();
@@ -554,13 +512,7 @@ fn bars_of_a_model_that_are_not_used_are_told() {
     let bar = Object { part: Part::Bar, ..scene.objects[0].clone() };
     let stirrup = Object { part: Part::Stirrup, ..bar.clone() };
     scene.objects.extend([bar.clone(), bar, stirrup]);
-    let prepared = prepare(
-        &scene,
-        &scene.structure.assemblies[0],
-        Meshing { element: Some(0.2) },
-        &Job::default(),
-    )
-    .unwrap();
+    let prepared = first(&scene, 0.2);
     assert!(
         matches!(&prepared.warnings[..], [one] if one.contains("3 nodes of bars") && one.contains("member P")),
         "{:?}",
@@ -633,13 +585,7 @@ fn a_beam_is_raised_until_its_bars_have_yielded() {
                 (member: \"B\", place: End, hold: Directions(x: true, y: false, z: false))],
              loads: [(name: \"jack\", action: Force(place: Surface(from: 0.9, to: 1, side_deg: 0), force_kn: (0, -10, 0)), history: [(28, 0)], loading: {loading})]"
         ));
-        let prepared = prepare(
-            &scene,
-            &scene.structure.assemblies[0],
-            Meshing { element: Some(0.1) },
-            &Job::default(),
-        )
-        .unwrap();
+        let prepared = first(&scene, 0.1);
         let life =
             analyze(&prepared, MarchSettings::of_life(), &Job::default(), &mut ()).unwrap().0;
         life.strength.unwrap()

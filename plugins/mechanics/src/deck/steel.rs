@@ -5,16 +5,10 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use super::{Case, DeckError, locate, unfit};
 use crate::{
     element::{embed::embed, rod::Piece},
-    material::steel::Bar,
     mesh::{ElementId, Locator},
     model::{Action, Matter, Steel, SteelKind},
     read::Deck,
 };
-
-/// Steel that does not yield.
-pub(super) fn elastic(modulus: f64) -> Bar {
-    Bar::elastic(modulus)
-}
 
 /// Pieces of a region's embedded bars, each with the stress before the first step.
 type Laid = BTreeMap<u32, (Vec<Piece>, Vec<f64>)>;
