@@ -752,3 +752,35 @@ impl Forecast {
         Some(Evidence { crack_width_mm: (width >= LEAST_MM).then_some(width), details, ..evidence })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use intrados_scene::{
+        Structure,
+        structure::{Load, Loading},
+    };
+
+    use super::*;
+
+    /// A scene may say that a load is raised until its members fail: that is for `analyze`.
+    #[test]
+    fn a_forecast_raises_no_load() {
+        let scene = Scene::load_bundled("column", &Job::default()).unwrap();
+        let raised = scene.structure.loads.iter().map(|l| Load {
+            loading: l.action.can_be_raised().then_some(Loading::Automatic),
+            ..l.clone()
+        });
+        let loads: Vec<Load> = raised.collect();
+        assert!(loads.iter().any(|l| l.loading.is_some()));
+        let structure = Structure { loads, ..Structure::clone(&scene.structure) };
+        let scene = Scene { structure: Arc::new(structure), ..scene };
+        let member = scene.structure.assembly("C1").unwrap();
+        let by_itself =
+            prepare_within(&scene, member, None, Meshing::default(), &Job::default()).unwrap();
+        assert!(by_itself.raised.is_some());
+        let ours = prepared(&scene, "C1", None, ForecastSettings::default(), &Job::default());
+        assert_eq!(ours.unwrap().raised, None);
+    }
+}
