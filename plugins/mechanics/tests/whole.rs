@@ -2,13 +2,18 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may end by a panic")]
 
-use glam::DVec3;
+use std::sync::Arc;
+
+use glam::{DVec3, Mat4, Vec3};
 use intrados_mechanics::{
     frame::{MemberForces, SectionForces, Whole, whole},
     member::{Meshing, prepare_within},
     model::Action,
 };
-use intrados_scene::Scene;
+use intrados_scene::{
+    Frame, Member, MemberKind, Mesh, Object, Part, Scene, Structure,
+    structure::{Hold, Place, Support},
+};
 use intrados_stage::Job;
 
 /// A scene of this text.
@@ -211,4 +216,79 @@ fn a_member_takes_what_the_others_do_to_it() {
         );
         assert!(all > 80e3, "{id} {all}");
     }
+}
+
+/// A pier with a head, as a model brings it: 3 m of .6 × .6 m, and .8 m of 2.4 × .6 m on top.
+fn pier() -> Scene {
+    let outline = [
+        [-0.3, 0.0],
+        [0.3, 0.0],
+        [0.3, 3.0],
+        [1.2, 3.0],
+        [1.2, 3.8],
+        [-1.2, 3.8],
+        [-1.2, 3.0],
+        [-0.3, 3.0],
+    ];
+    let n = outline.len() as u32;
+    let at = |z: f32| outline.map(|[x, y]| Vec3::new(x, y, z));
+    // Stem and head, split where they meet.
+    let face: [[u32; 3]; 6] = [[0, 1, 2], [0, 2, 7], [6, 7, 2], [6, 2, 3], [6, 3, 4], [6, 4, 5]];
+    let back = face.map(|[a, b, c]| [a, c, b]);
+    let front = face.map(|t| t.map(|i| i + n));
+    let sides = (0..n).flat_map(|i| {
+        let k = (i + 1) % n;
+        [[i, k, k + n], [i, k + n, i + n]]
+    });
+    let mesh = Mesh {
+        positions: [at(-0.3), at(0.3)].concat(),
+        triangles: back.into_iter().chain(front).chain(sides).collect(),
+        ..Mesh::default()
+    };
+    let bounds = [Vec3::new(-1.2, 0.0, -0.3), Vec3::new(1.2, 3.8, 0.3)];
+    let member = Member {
+        id: "P".into(),
+        name: "P".into(),
+        kind: MemberKind::Column,
+        concrete: "C30/37".into(),
+        concrete_assumed: false,
+        exposure: None,
+        frame: Frame::of_box(MemberKind::Column, bounds),
+        bounds,
+        volume: PIER,
+        slices: Vec::new(),
+        truth: Vec::new(),
+    };
+    let object = Object {
+        name: "P".into(),
+        mesh: 0,
+        transform: Mat4::IDENTITY,
+        material: 0,
+        member: Some(0),
+        part: Part::Concrete,
+    };
+    let support =
+        Support { member: "P".into(), place: Place::Bottom, hold: Hold::Fixed, alone: false };
+    let mut scene = Scene {
+        meshes: vec![Arc::new(mesh)],
+        objects: vec![object],
+        members: vec![member],
+        structure: Arc::new(Structure { supports: vec![support], ..Structure::default() }),
+        ..Scene::default()
+    };
+    scene.assemble();
+    scene
+}
+
+/// Volume of that pier, m³.
+const PIER: f64 = 0.6 * (0.6 * 3.0 + 2.4 * 0.8);
+
+/// What its sections in the middles of its pieces make of a pier is not its volume; what the ground
+/// bears is, to the rounding of the model's coordinates.
+#[test]
+fn a_ragged_body_weighs_what_its_volume_does() {
+    let scene = pier();
+    let found = whole(&scene, false, &Job::default()).unwrap();
+    let weight = PIER * 2400.0 * 9.81;
+    assert!(near(up(&found, "P"), weight, 1e-5), "{} of {weight}", up(&found, "P"));
 }

@@ -76,6 +76,12 @@ struct Frame {
 }
 
 impl Shell {
+    /// Half the cross product of its diagonals (m²): exact where it is flat.
+    pub(crate) fn area(&self) -> f64 {
+        let [a, b, c, d] = self.nodes;
+        0.5 * (c - a).cross(d - b).length()
+    }
+
     /// Stiffness and internal force. `initial(point)` is the initial membrane force N₁₁, N₂₂, N₁₂
     /// (N/m) at the 2 × 2 Gauss points in the frame of [`Resultants`]; it loads the nodes and adds
     /// no geometric stiffness.

@@ -119,8 +119,7 @@ impl Deck {
                 plate.thickness
             );
             let _ = writeln!(heavy, "{n}");
-            let [p, q, r, s] = plate.nodes;
-            let area = 0.5 * (r - p).cross(s - q).length();
+            let area = plate.area();
             for (_, pressure) in case.plates.iter().filter(|c| c.0 as usize == k) {
                 // Its weight acts by itself.
                 let more = *pressure + plate.thickness * density * GRAVITY * DVec3::Y;
@@ -239,8 +238,16 @@ fn the_slabs_of_the_bridge_sag_as_in_calculix() {
     let weight = own_weight();
     assert!(matches!(weight.action, Action::SelfWeight));
     let mut case = super::whole::case(&draft, &built, &weight, &mut Vec::new());
-    // 5 kN/m² on the sheets that lie.
+    // There a beam weighs what its section does, and no more.
+    for (b, along) in &mut case.beams {
+        let area = built.model.beams[*b as usize].0.section.area;
+        along.force = -GRAVITY * draft.parts[0].concrete.density * area * DVec3::Y;
+    }
+    // Plates likewise, and 5 kN/m² on the sheets that lie.
+    case.plates.clear();
     for (k, (plate, _)) in built.model.plates.iter().enumerate() {
+        let own = -GRAVITY * draft.parts[0].concrete.density * plate.thickness * DVec3::Y;
+        case.plates.push((k as u32, own));
         let [a, b, c, d] = plate.nodes;
         if (c - a).cross(d - b).normalize().y.abs() > 0.7 {
             case.plates.push((k as u32, -5e3 * DVec3::Y));

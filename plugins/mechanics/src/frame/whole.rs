@@ -340,6 +340,21 @@ pub(super) fn case(draft: &Draft, built: &Built, load: &Load, notes: &mut Vec<St
 }
 
 impl Part<'_> {
+    /// Its volume over that of the bars or plates that stand for it: what its sections, taken in
+    /// the middle of each piece, miss of a tapered or ragged body weighs all the same. A member
+    /// by its measures has that of its measures.
+    fn fullness(&self, built: &Built, p: usize) -> f64 {
+        if self.assembly.body.is_some() {
+            return 1.0;
+        }
+        let elements = &built.elements[p];
+        let bars = built.model.beams[elements.beams.clone()].iter();
+        let bars: f64 = bars.map(|(beam, _)| beam.section.area * beam.length()).sum();
+        let plates = built.model.plates[elements.plates.clone()].iter();
+        let plates: f64 = plates.map(|(plate, _)| plate.thickness * plate.area()).sum();
+        self.solid.volume / (bars + plates)
+    }
+
     /// Adds what an action does to it.
     fn act(
         &self,
@@ -353,7 +368,7 @@ impl Part<'_> {
         let force = |force: DVec3| Along { force, ..Along::default() };
         match action {
             Action::SelfWeight => {
-                let weight = -GRAVITY * self.concrete.density * DVec3::Y;
+                let weight = -GRAVITY * self.concrete.density * self.fullness(built, p) * DVec3::Y;
                 for b in elements.beams.clone() {
                     let area = built.model.beams[b].0.section.area;
                     case.beams.push((b as u32, force(area * weight)));

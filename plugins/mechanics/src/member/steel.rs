@@ -10,7 +10,10 @@ use intrados_scene::{
 
 use super::{Draft, MemberError};
 use crate::{
-    element::{embed::embed, rod::Piece},
+    element::{
+        embed::{EmbedError, embed},
+        rod::Piece,
+    },
     material::{
         DAY,
         bond::Bond,
@@ -30,7 +33,7 @@ impl Draft<'_> {
         let mesh = std::mem::take(&mut self.model.mesh);
         let locator = Locator::new(&mesh);
         let skin = self.skin(&mesh)?;
-        let lines = self.within(&locator);
+        let lines = self.within(&locator, &mesh);
         let laid: Result<Vec<Steel>, MemberError> = lines
             .iter()
             .map(|line| self.lay(line, &locator, skin.as_ref(), |h| mesh.corners(h as u32)))
@@ -50,16 +53,22 @@ impl Draft<'_> {
 
     /// The lines to lay. Of a member that came with a model only what lies in its concrete: bars
     /// lead on into its neighbours, and cubes stand off its surface a little.
-    fn within(&mut self, locator: &Locator) -> Vec<SteelLine> {
+    fn within(&mut self, locator: &Locator, mesh: &Mesh) -> Vec<SteelLine> {
         if self.member.body.is_some() {
             return self.member.steel.clone();
         }
+        let find = |p: DVec3| locator.locate(p).map(|host| (host.hex as usize, host.natural));
+        let leaves = |run: &[DVec3]| match embed(run, find, |h| mesh.corners(h as u32)) {
+            Err(EmbedError::Outside { along, .. }) => Some(along),
+            _ => None,
+        };
         let mut lines = Vec::new();
         let [mut all, mut kept] = [0.0; 2];
         for line in &self.member.steel {
             let is_in = |p: DVec3| locator.locate(p).is_some();
             let points: Vec<DVec3> = line.line.iter().map(|p| p.as_dvec3()).collect();
             let runs = inside(&self.off_the_skin(&points, &is_in), is_in);
+            let runs: Vec<_> = runs.into_iter().flat_map(|run| parted(run, leaves)).collect();
             all += length(&points);
             kept += runs.iter().map(|run| length(run)).sum::<f64>();
             // A tendon that is cut is none: its anchorages are its ends.
@@ -307,10 +316,49 @@ fn length(line: &[DVec3]) -> f64 {
     line.windows(2).map(|w| w[0].distance(w[1])).sum()
 }
 
+/// What of a bar is looked at to find where it leaves the concrete, and what is too short to be a
+/// bar, m.
+const STEP: f64 = 0.01;
+const SHORTEST: f64 = 0.01;
+
+/// A line parted wherever it `leaves` the concrete (m from its start) for less than a step, at a
+/// corner of a cube say: a centimetre after that is left out.
+fn parted(line: Vec<DVec3>, leaves: impl Fn(&[DVec3]) -> Option<f64>) -> Vec<Vec<DVec3>> {
+    const HAIR: f64 = 1e-4;
+    let (mut rest, mut parts) = (line, Vec::new());
+    while length(&rest) > SHORTEST {
+        let Some(along) = leaves(&rest) else {
+            parts.push(rest);
+            break;
+        };
+        let before = cut(&rest, 0.0, along - HAIR);
+        if length(&before) > SHORTEST {
+            parts.push(before);
+        }
+        rest = cut(&rest, along + STEP, f64::INFINITY);
+    }
+    parts
+}
+
+/// What of a line lies between two distances from its start, m.
+fn cut(line: &[DVec3], from: f64, to: f64) -> Vec<DVec3> {
+    let (mut kept, mut before) = (Vec::new(), 0.0);
+    for ends in line.windows(2) {
+        let long = ends[0].distance(ends[1]);
+        let [first, last] = [from, to].map(|at| ((at - before) / long).clamp(0.0, 1.0));
+        if long > 0.0 && last > first {
+            if kept.is_empty() {
+                kept.push(ends[0].lerp(ends[1], first));
+            }
+            kept.push(ends[0].lerp(ends[1], last));
+        }
+        before += long;
+    }
+    kept
+}
+
 /// The parts of a line that are inside, to a tenth of a millimetre; none shorter than a centimetre.
 fn inside(line: &[DVec3], is_in: impl Fn(DVec3) -> bool) -> Vec<Vec<DVec3>> {
-    const STEP: f64 = 0.01;
-    const SHORTEST: f64 = 0.01;
     let mut runs: Vec<Vec<DVec3>> = Vec::new();
     let mut run: Vec<DVec3> = Vec::new();
     for ends in line.windows(2) {
@@ -392,5 +440,32 @@ fn jacked(p: &Prestress, grade: StrandGrade) -> prestress::Tendon {
         wobble: f64::from(p.wobble_per_m),
         slip: f64::from(p.slip_mm) / 1000.0,
         jack: if p.both_ends { Jack::Both } else { Jack::First },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A bar that passes the corner of a notch: 4 mm of it are in the air, which a look every
+    /// centimetre does not see.
+    #[test]
+    fn a_bar_that_leaves_the_concrete_for_less_than_a_step_is_parted_there() {
+        let line = [0.0, 1.0, 2.0].map(|x| DVec3::new(x, 0.0, 0.0)).to_vec();
+        let air = [1.2033, 1.2073];
+        let is_in = |p: DVec3| !(air[0]..air[1]).contains(&p.x);
+        assert_eq!(inside(&line, is_in), [line.clone()]);
+        let leaves = |run: &[DVec3]| {
+            let (from, to) = (run[0].x, run[run.len() - 1].x);
+            (from < air[1] && to > air[0]).then(|| (air[0] - from).max(0.0))
+        };
+        let parts = parted(line, leaves);
+        let ends: Vec<[f64; 2]> = parts.iter().map(|p| [p[0].x, p[p.len() - 1].x]).collect();
+        let wanted = [[0.0, 1.2032], [1.2133, 2.0]];
+        let off = |(a, b): (&[f64; 2], &[f64; 2])| (a[0] - b[0]).abs().max((a[1] - b[1]).abs());
+        assert_eq!(ends.len(), 2);
+        assert!(ends.iter().zip(&wanted).all(|both| off(both) < 1e-9), "{ends:?}");
+        // The middle point is kept.
+        assert_eq!(parts[0].len(), 3);
     }
 }
