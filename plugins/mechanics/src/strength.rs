@@ -108,6 +108,9 @@ const SPENT: f64 = 0.78;
 const FIRST: f64 = 1e-6;
 /// By so much steps grow while the member answers as it did at first.
 const GROWTH: f64 = 1.5;
+/// Up to here nothing cracks, over the longest measure: steps grow whatever they tell, which is
+/// noise as long as they move less than equilibrium is exact.
+const EARLY: f64 = 2e-5;
 /// Stiffness over that of the beginning from which on steps are short.
 const SOFT: f64 = 0.85;
 /// Short steps, over how far it has moved.
@@ -234,7 +237,7 @@ pub(crate) fn raise(
             ended = why;
             break;
         }
-        step = watch.next(step, &mut stiffness);
+        step = watch.next(step, length, &mut stiffness);
     }
     let history = march.history;
     Ok((watch.tell(ended, job)?, history))
@@ -396,17 +399,25 @@ impl<'a, 'm> Watch<'a, 'm> {
     }
 
     /// How far the next step goes.
-    fn next(&self, step: f64, stiffness: &mut Option<f64>) -> f64 {
+    fn next(&self, step: f64, length: f64, stiffness: &mut Option<f64>) -> f64 {
         let [before, now] = [self.curve[self.curve.len() - 2], self.curve[self.curve.len() - 1]];
         let slope = (now.load_factor - before.load_factor)
             / (now.displacement_m - before.displacement_m).abs().max(1e-300);
-        let first = *stiffness.get_or_insert(slope);
         let moved = now.displacement_m.abs();
-        let next = if slope > SOFT * first { GROWTH * step } else { step.min(SHORT * moved) };
+        let is_early = moved < EARLY * length;
+        if is_early {
+            *stiffness = Some(slope);
+        }
+        let first = *stiffness.get_or_insert(slope);
+        let grows = is_early || slope > SOFT * first;
+        let next = if grows { GROWTH * step } else { step.min(SHORT * moved) };
         let most = match self.raised.along {
             Along::Displacement(Some(to)) => (to - moved).max(0.0),
             _ => f64::INFINITY,
         };
+        if is_early {
+            return next.min(most);
+        }
         next.max(0.5 * SHORT * moved).min(2.5 * SHORT * moved.max(step)).min(most)
     }
 

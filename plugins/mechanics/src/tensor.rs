@@ -311,6 +311,22 @@ pub(crate) fn rankine(strain: &Voigt, nu: f64) -> Equivalent {
     }
 }
 
+/// The least principal stress, without directions: the least root of the characteristic polynomial
+/// by the angle of its three real ones (Smith 1961); exact to the square root of rounding.
+#[must_use]
+pub(crate) fn least_principal(s: &Voigt) -> f64 {
+    let mean = i1(s) / 3.0;
+    let [a, b, c] = [s[0] - mean, s[1] - mean, s[2] - mean];
+    let [xy, yz, zx] = [s[3], s[4], s[5]];
+    let size = ((a * a + b * b + c * c) / 6.0 + (xy * xy + yz * yz + zx * zx) / 3.0).sqrt();
+    if size <= 0.0 {
+        return mean;
+    }
+    let det = a * (b * c - yz * yz) - xy * (xy * c - yz * zx) + zx * (xy * yz - b * zx);
+    let angle = (0.5 * det / size.powi(3)).clamp(-1.0, 1.0).acos() / 3.0;
+    mean + 2.0 * size * (angle + 2.0 * std::f64::consts::FRAC_PI_3).cos()
+}
+
 /// Modified von Mises equivalent strain (de Vree, Brekelmans and van Gils 1995) with `k` = f_c/f_t:
 /// (k−1)I₁/(2k(1−2ν)) + √(((k−1)I₁/(1−2ν))² + 12k J₂/(1+ν)²)/(2k). It is ε in uniaxial tension
 /// and |ε|/k in uniaxial compression.
@@ -337,6 +353,22 @@ pub(crate) fn modified_von_mises(strain: &Voigt, k: f64, nu: f64) -> Equivalent 
 pub(crate) mod tests {
     use super::*;
     use intrados_stage::random::Key;
+
+    #[test]
+    fn the_least_principal_stress_is_that_of_the_axes() {
+        for walk in 0..1000 {
+            let stress = random(walk, 1e7);
+            let least = Principal::of_stress(&stress).values[2];
+            assert!((least_principal(&stress) - least).abs() < 1e-6, "{stress:?}");
+        }
+        for (stress, least) in [
+            ([-3.0, -3.0, -3.0, 0.0, 0.0, 0.0], -3.0),
+            ([1.0, 1.0, -2.0, 0.0, 0.0, 0.0], -2.0),
+            ([5.0, -1.0, -1.0, 0.0, 0.0, 0.0], -1.0),
+        ] {
+            assert!((least_principal(&stress) - least).abs() < 1e-7, "{stress:?}");
+        }
+    }
 
     /// A tensor of random components within ±`size`.
     pub(crate) fn random(walk: u64, size: f64) -> Voigt {

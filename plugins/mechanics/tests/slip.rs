@@ -51,6 +51,7 @@ fn a_bar_is_pulled_out() {
         kind: SteelKind::Bar(bar),
         rust: None,
         bond: Some(slipping),
+        displaces: false,
     });
     let end = System::new(&model).unwrap().slip_node(0, model.steel[0].pieces.len()).unwrap();
     let force = 100.0;

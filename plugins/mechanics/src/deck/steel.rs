@@ -68,6 +68,8 @@ impl Case {
                 kind: SteelKind::Stressed(steel, stress),
                 rust: None,
                 bond: None,
+                // As in Abaqus, whose embedded elements lie over their host.
+                displaces: false,
             });
         }
         self.take_out(&gone)

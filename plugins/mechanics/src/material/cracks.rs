@@ -343,6 +343,9 @@ impl Concrete {
         let clock = self.clock(state, step);
         let past = clock.increment.past(&state.history);
         let effective = self.effective(strain, state, &clock, &past);
+        if let Some(sound) = self.still_sound(strain, &effective, growth, state, &clock, &past) {
+            return sound;
+        }
         let before = &state.planes;
         let axes = before.turned(&effective);
         let bands = axes.map(|n| self.along(&n, step));
@@ -385,6 +388,69 @@ impl Concrete {
             state,
             ..response
         }
+    }
+
+    /// The answer of a point without cracks and crushing that stays so, which is Hooke's and needs
+    /// no principal axes; none where that is not certain. Most points are like this.
+    fn still_sound(
+        &self,
+        strain: &Voigt,
+        effective: &Voigt,
+        growth: Option<f64>,
+        state: &State,
+        clock: &Clock,
+        past: &Voigt,
+    ) -> Option<Response> {
+        let before = &state.planes;
+        if before.cracked() || before.fixed || state.damage != [0.0; 2] {
+            return None;
+        }
+        let (e, nu) = (self.elastic.modulus, self.elastic.poisson);
+        let bears = clock.aged.fctm / e;
+        // What was asked for may become a crack whatever the strain is now.
+        if growth.is_some() && before.asked.iter().any(|asked| *asked > bears) {
+            return None;
+        }
+        let crept = 1.0 + clock.creep(e);
+        let hooke = tensor::stiffness(e, nu);
+        let section = tensor::scale(effective, 1.0 / crept);
+        let stress = tensor::apply(&hooke, &section);
+        let drive = tensor::scale(&section, e * clock.nonlinear);
+        let delayed = tensor::scale(&tensor::sub(&drive, &state.drive), clock.increment.delayed);
+        let creep = tensor::add(&tensor::add(&state.creep, past), &delayed);
+        let share = tensor::scale(&creep, self.setting.creep_share);
+        let (asked, _) = self.measure.of(&tensor::add(&section, &share), nu);
+        let share = tensor::von_mises(&tensor::apply(&hooke, &share));
+        // A strain that is not finite is for the whole law to tell.
+        if !(asked <= bears && clock.is_harmless(tensor::von_mises(&stress) + share)) {
+            return None;
+        }
+        let mechanical = tensor::sub(effective, &tensor::scale(&section, crept - 1.0));
+        Some(Response {
+            stress,
+            tangent: hooke.map(|row| tensor::scale(&row, clock.stiffening / crept)),
+            state: State {
+                strain: *strain,
+                mechanical,
+                creep,
+                history: clock
+                    .increment
+                    .advance(&state.history, &tensor::sub(&drive, &state.drive)),
+                drive,
+                thermal: clock.thermal,
+                shrinkage: clock.shrinkage,
+                maturity: clock.maturity,
+                utilisation: -tensor::least_principal(&stress).min(0.0) / clock.aged.fck,
+                planes: Planes { asked: [asked, 0.0, 0.0], ..SOUND },
+                ..*state
+            },
+            local: (asked, ZERO),
+            bears,
+            by_nonlocal: ZERO,
+            crack_width: 0.0,
+            crack_normal: SOUND.axes[0],
+            energy: 0.5 * tensor::dot(&stress, &mechanical),
+        })
     }
 
     /// How far the element reaches along a direction, m.

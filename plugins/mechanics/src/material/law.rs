@@ -541,6 +541,11 @@ pub(super) struct Clock {
 }
 
 impl Clock {
+    /// Whether no stress whose von Mises stress is at most this crushes, Pa ([`crushing_limit`]).
+    pub(super) fn is_harmless(&self, von_mises: f64) -> bool {
+        von_mises <= (1.0 - ALPHA) * self.harmless
+    }
+
     /// Creep of the step per unit of strain on the section.
     pub(super) fn creep(&self, modulus: f64) -> f64 {
         self.increment.delayed * self.nonlinear * self.stiffening * modulus
@@ -625,7 +630,7 @@ mod tests {
     /// Stress along x at the axial strain, with free sides.
     fn pulled(law: &Concrete, axial: f64, state: &State) -> Response {
         let mut lateral = state.strain[1];
-        for _ in 0..200 {
+        for _ in 0..2000 {
             let answer = law.respond(&[axial, lateral, lateral, 0.0, 0.0, 0.0], state, &NOW);
             let change = answer.stress[1] / (answer.tangent[1][1] + answer.tangent[1][2]);
             lateral -= change;

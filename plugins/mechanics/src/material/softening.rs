@@ -116,6 +116,13 @@ impl Knee {
 /// leaves the line smoothly and reaches f_c at ε_c1 with no slope, then σ = f_c exp(−(κ −
 /// ε_c1)/ε_s) with ε_s = G_c/(h f_c) − ε_c1/2.
 ///
+/// Smaller elements than [`GAUGE`] crush as that length does: the code's curve is of bodies of that
+/// size, and in bending all of it crushes together, whatever the mesh. Stretched over its own size
+/// alone, a row of small bricks would bear in the zone of compression what no section bears (mean
+/// stress .81 f_c for C30 and 60 mm, where the code's curve gives .75), and its bars would yield
+/// where the section's do not. The price: where a row of them crushes by itself, less energy is
+/// dissipated than G_c.
+///
 /// The parabola is σ = f_c(1 − .6 ((ε_c1 − κ)/(ε_c1 − ε₀))^p) with p = (E ε_c1 − .4 f_c)/(.6 f_c),
 /// about 2.5.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -131,6 +138,10 @@ pub(crate) struct Compression {
     /// Decay ε_s of the descending branch.
     decay: f64,
 }
+
+/// Length of the bodies that codes' curves of compression describe past the peak, m (CEB-FIP Model
+/// Code 1990, 2.1.4.4.1).
+pub(super) const GAUGE: f64 = 0.2;
 
 /// Share of the strength up to which compression is elastic.
 pub(super) const ELASTIC: f64 = 0.4;
@@ -166,7 +177,7 @@ impl Compression {
             peak,
             exponent,
             strength,
-            decay: (gc / (h * fc) - 0.5 * peak).max(0.01 * peak),
+            decay: (gc / (h.max(GAUGE) * fc) - 0.5 * peak).max(0.01 * peak),
         }
     }
 
@@ -199,7 +210,7 @@ mod tests {
     use super::*;
 
     fn work(stress: impl Fn(f64) -> f64, to: f64) -> f64 {
-        let n = 200_000;
+        let n = 20_000;
         let at = |k: i32| to * f64::from(k) / f64::from(n);
         (0..n).map(|k| 0.5 * (stress(at(k)) + stress(at(k + 1))) * to / f64::from(n)).sum()
     }
@@ -245,7 +256,8 @@ mod tests {
     #[test]
     fn compression_peaks_at_the_strength_and_keeps_the_crushing_energy() {
         let (e, fc, peak, gc) = (32.8e9, 38e6, 2.16e-3, 35e3);
-        for h in [0.05, 0.1, 0.3] {
+        assert_eq!(Compression::of(e, fc, peak, gc, 0.05), Compression::of(e, fc, peak, gc, GAUGE));
+        for h in [GAUGE, 0.3] {
             let law = Compression::new(e, fc, peak, gc, h).unwrap();
             let stress = |k: f64| {
                 if law.damage(k).0 < MAX_DAMAGE { (1.0 - law.damage(k).0) * e * k } else { 0.0 }
@@ -265,6 +277,36 @@ mod tests {
             Compression::new(e, fc, peak, gc, 1.0),
             Err(Error::ElementTooLarge { what: "compression", .. })
         ));
+    }
+
+    /// The most that the mean stress over a zone of compression gets to, under the curve of EN
+    /// 1992-1-1 (3.14) and under ours in bricks of 60 mm: within 2 % for C12 to C50, but for C12
+    /// itself, where it is 4 %.
+    #[test]
+    fn a_zone_of_compression_bears_what_the_code_says() {
+        for (fck, allowed) in
+            [(12.0, 0.045), (20.0, 0.025), (30.0, 0.01), (40.0, 0.02), (50.0, 0.03)]
+        {
+            let fcm: f64 = fck + 8.0;
+            let e = 22e9 * (0.1 * fcm).powf(0.3);
+            let peak = (0.7e-3 * fcm.powf(0.31)).max(1.3e6 * fcm / e);
+            let gc = 250.0 * 73.0 * fcm.powf(0.18);
+            let law = Compression::of(e, 1e6 * fcm, peak, gc, 0.06);
+            let ours = |k: f64| (1.0 - law.damage(k).0) * e * k / (1e6 * fcm);
+            let first = 0.7e-3 * fcm.powf(0.31);
+            let k = 1.05 * e * first / (1e6 * fcm);
+            let code = |strain: f64| {
+                let eta = strain / first;
+                if strain > 3.5e-3 { 0.0 } else { (k * eta - eta * eta) / (1.0 + (k - 2.0) * eta) }
+            };
+            let most = |stress: &dyn Fn(f64) -> f64| {
+                let means = (1..=100).map(|n| 1e-4 * f64::from(n));
+                means.map(|to| work(stress, to) / to).fold(0.0, f64::max)
+            };
+            let (ours, code) = (most(&ours), most(&code));
+            println!("C{fck}: {ours:.3} f_cm, by the code {code:.3}");
+            assert!((ours / code - 1.0).abs() < allowed, "C{fck}: {ours} {code}");
+        }
     }
 
     #[test]

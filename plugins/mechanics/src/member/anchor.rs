@@ -158,6 +158,14 @@ impl Draft<'_> {
             Bar::new(YIELD[0]).map_err(|source| MemberError::Material { id: self.id(), source })?;
         // A plane through the tendon cuts every turn twice.
         let area = BURSTING * force / YIELD[1] / (2.0 * turns);
-        Ok(Some(Steel { name, pieces, area, kind: SteelKind::Bar(bar), rust: None, bond: None }))
+        Ok(Some(Steel {
+            name,
+            pieces,
+            area,
+            kind: SteelKind::Bar(bar),
+            rust: None,
+            bond: None,
+            displaces: true,
+        }))
     }
 }

@@ -128,6 +128,7 @@ impl Draft<'_> {
                 kind: SteelKind::Bar(bar),
                 rust,
                 bond,
+                displaces: true,
             });
         };
         let Some(grade) = StrandGrade::named(&stressing.steel) else {
@@ -155,7 +156,7 @@ impl Draft<'_> {
             plates: [None, None],
         });
         // A tendon lies in its duct.
-        Ok(Steel { name, pieces, area: tendon.area, kind, rust: None, bond: None })
+        Ok(Steel { name, pieces, area: tendon.area, kind, rust: None, bond: None, displaces: true })
     }
 
     /// How a bar slips where the scene asks for it: good conditions, ribs .6 of a diameter apart,

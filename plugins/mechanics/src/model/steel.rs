@@ -25,6 +25,9 @@ pub struct Steel {
     pub rust: Option<Rust>,
     /// How it slips; none: perfect bond. For bars.
     pub bond: Option<Slipping>,
+    /// Whether there is no concrete where it lies; else it is added to the concrete, as closed
+    /// forms and decks of other programs have it.
+    pub displaces: bool,
 }
 
 /// Bond that gives way.
@@ -240,8 +243,15 @@ mod tests {
         let rust =
             Rust { diameter: 8e-3, current: 0.01, since: vec![10.0 * YEAR], cover: vec![0.03] };
         let kind = SteelKind::Bar(Bar::new(500e6).unwrap());
-        let steel =
-            Steel { name: "bar".into(), pieces, area: 5e-5, kind, rust: Some(rust), bond: None };
+        let steel = Steel {
+            name: "bar".into(),
+            pieces,
+            area: 5e-5,
+            kind,
+            rust: Some(rust),
+            bond: None,
+            displaces: true,
+        };
         let u: [f64; 24] =
             std::array::from_fn(|i| if i % 3 == 0 { 1e-3 * corners[i / 3].x } else { 0.0 });
         let force = |time: f64| {

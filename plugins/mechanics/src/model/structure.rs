@@ -38,6 +38,8 @@ pub struct System<'m> {
     pub(super) elements: Connectivity,
     /// Which bar, and which piece of it, each element after the bricks is.
     pieces: Vec<(u32, u32)>,
+    /// Share of each brick that is concrete: steel displaces the rest.
+    concrete: Vec<f64>,
     /// Since when each joint has a brick on both sides, s.
     joined: Vec<f64>,
     pattern: Arc<Pattern>,
@@ -144,7 +146,19 @@ impl<'m> System<'m> {
             nodes.iter().map(|&n| since[n as usize]).fold(f64::NEG_INFINITY, f64::max)
         };
         let joined = mesh.interfaces.iter().map(|joint| latest(&joint.nodes)).collect();
-        Ok(Self { model, law_of, laws, elements, pieces, joined, pattern, rotations, slips })
+        let concrete = undisplaced(model);
+        Ok(Self {
+            model,
+            law_of,
+            laws,
+            elements,
+            pieces,
+            concrete,
+            joined,
+            pattern,
+            rotations,
+            slips,
+        })
     }
 
     /// Unknowns.
@@ -657,7 +671,8 @@ impl<'m> System<'m> {
                     .for_each(|s| *s *= left);
             }
             each(point, &answer);
-            (answer.stress, answer.tangent)
+            let of_brick = |s: f64| s * self.concrete[hex];
+            (answer.stress.map(of_brick), answer.tangent.map(|row| row.map(of_brick)))
         };
         let corners = self.model.mesh.corners(hex as u32);
         let solid =
@@ -717,6 +732,19 @@ impl<'m> System<'m> {
     pub(super) fn of_hex(&self, hex: usize, source: ElementError) -> Failure {
         Failure::Element { element: self.model.mesh.name(ElementId::Hex(hex as u32)), source }
     }
+}
+
+/// Of each brick the share that no steel displaces; what is more steel than concrete counts as half.
+fn undisplaced(model: &Model) -> Vec<f64> {
+    let mut steel = vec![0.0; model.mesh.hexes.len()];
+    for bar in model.steel.iter().filter(|bar| bar.displaces) {
+        bar.pieces.iter().for_each(|piece| steel[piece.host] += bar.area * piece.length());
+    }
+    let share = |(hex, steel): (usize, f64)| match steel > 0.0 {
+        true => 1.0 - (steel / model.mesh.hex_volume(hex as u32)).min(0.5),
+        false => 1.0,
+    };
+    steel.into_iter().enumerate().map(share).collect()
 }
 
 /// How a brick has moved.

@@ -121,6 +121,7 @@ pub(super) fn ring(job: &Job) -> Checks {
         kind,
         rust: None,
         bond: None,
+        displaces: false,
     }];
     let mut model = Model {
         bodies: vec![always(Matter::Elastic(elastic(34.5e9, 0.2)))],
@@ -223,6 +224,7 @@ pub(super) fn bursting(job: &Job) -> Checks {
         kind,
         rust: None,
         bond: None,
+        displaces: false,
     }];
     let mut model = Model {
         bodies: vec![always(Matter::Elastic(elastic(34.5e9, 0.2)))],

@@ -129,6 +129,7 @@ pub(super) fn column(job: &Job) -> Checks {
         kind: SteelKind::Bar(Bar::new(500e6)?),
         rust: None,
         bond: None,
+        displaces: false,
     });
     model.loads.push(push(&model, -1.6e6));
     let shrinkage = Action::Temperature(vec![-30.0; model.mesh.nodes.len()]);

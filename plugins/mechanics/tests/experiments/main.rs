@@ -34,6 +34,7 @@
 mod band;
 mod column;
 mod flexure;
+mod interaction;
 mod panel;
 mod series;
 mod shear;
@@ -163,7 +164,15 @@ fn lay(model: &mut Model, name: &str, ends: [DVec3; 2], [count, area]: [f64; 2],
             anchored: [true; 2],
         }
     });
-    model.steel.push(Steel { name: name.into(), pieces, area, kind, rust: None, bond });
+    model.steel.push(Steel {
+        name: name.into(),
+        pieces,
+        area,
+        kind,
+        rust: None,
+        bond,
+        displaces: true,
+    });
 }
 
 /// Forces along `direction` at nodes, 1 kN together.

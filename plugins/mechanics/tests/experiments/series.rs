@@ -145,7 +145,7 @@ impl Observer for Talk {
 }
 
 /// What a member of a scene bears.
-fn strength(text: &str, element: Option<f64>) -> Strength {
+pub(super) fn strength(text: &str, element: Option<f64>) -> Strength {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("test.ron");
     std::fs::write(&path, text).unwrap();

@@ -1,0 +1,113 @@
+//! Bending with axial force: a column of .4 × .4 m on the mesh that a user gets, against its section
+//! by fibres. Half of a member on two supports is computed: pressed along its axis first, then
+//! pushed in the middle, which nothing clamps.
+
+use super::{series::strength, *};
+
+/// Side of the section; half of the span, from the support to the middle, m.
+const SIDE: f64 = 0.4;
+const ARM: f64 = 2.0;
+/// Of the member beyond its support, and half of what the jack presses on, m.
+const BEYOND: f64 = 0.2;
+const PLATE: f64 = 0.1;
+/// Bars near the pushed and the pulled face: depth, m, how many of 20 mm.
+const ROWS: [(f64, f64); 3] = [(0.05, 3.0), (0.2, 2.0), (0.35, 3.0)];
+const YIELD: f64 = 500e6;
+/// MPa.
+const FCM: f64 = 38.0;
+
+fn scene(axial: f64) -> String {
+    let long = ARM + BEYOND;
+    let (support, plate) = (BEYOND / long, 1.0 - PLATE / long);
+    let fck = FCM - 8.0;
+    format!(
+        r#"(schema: "intrados.scene/1", title: "N and M",
+        concretes: [(name: "tested", fck_mpa: {fck}, fcm_mpa: {FCM})],
+        members: [(id: "C", concrete: "tested", at: (0, 0, 0), body: Beam(
+            section: Rectangle(width_m: {SIDE}, depth_m: {SIDE}), length_m: {long},
+            reinforcement: (cover_mm: 32, bars: [
+                Row(side_deg: 0, count: 3, diameter_mm: 20),
+                Row(side_deg: 0, count: 2, diameter_mm: 20, inset_mm: 150),
+                Row(side_deg: 180, count: 3, diameter_mm: 20),
+            ], stirrups: (diameter_mm: 8, spacing_mm: 100))))],
+        supports: [
+            (member: "C", place: Surface(from: {support}, to: {support}, side_deg: 180), hold: Directions(x: false, y: true, z: true)),
+            (member: "C", place: End, hold: Directions(x: true, y: false, z: false)),
+        ],
+        loads: [
+            (name: "axial", action: Force(place: Start, force_kn: ({axial}, 0, 0)), history: [(27.9, 0), (28, 1)]),
+            (name: "jack", action: Force(place: Surface(from: {plate}, to: 1, side_deg: 0), force_kn: (0, -20, 0)), history: [(28, 0)]),
+        ])"#
+    )
+}
+
+/// Stress of concrete under a compressive strain, Pa: EN 1992-1-1 (3.14), nothing from .0035 on.
+fn pressed(strain: f64) -> f64 {
+    let first = 0.7e-3 * FCM.powf(0.31);
+    let k = 1.05 * 22e3 * (0.1 * FCM).powf(0.3) * first / FCM;
+    let eta = strain / first;
+    if (0.0..=3.5e-3).contains(&strain) {
+        1e6 * FCM * (k * eta - eta * eta) / (1.0 + (k - 2.0) * eta)
+    } else {
+        0.0
+    }
+}
+
+/// The largest moment of the section under an axial force, N m; N is compression.
+fn by_fibres(axial: f64) -> f64 {
+    const STRIPS: u32 = 400;
+    let bar = 0.25 * PI * 0.02_f64.powi(2);
+    // Force and moment about the middle at a strain of the upper edge and a curvature.
+    let of = |top: f64, curvature: f64| {
+        let strain = |depth: f64| top - curvature * depth;
+        let strips = (0..STRIPS).map(|i| {
+            let depth = SIDE * (f64::from(i) + 0.5) / f64::from(STRIPS);
+            (depth, pressed(strain(depth)) * SIDE * SIDE / f64::from(STRIPS))
+        });
+        let bars = ROWS.iter().map(|&(depth, count)| {
+            let steel = (200e9 * strain(depth)).clamp(-YIELD, YIELD);
+            (depth, count * bar * (steel - pressed(strain(depth))))
+        });
+        let add =
+            |sum: [f64; 2], (depth, f): (f64, f64)| [sum[0] + f, sum[1] + f * (0.5 * SIDE - depth)];
+        strips.chain(bars).fold([0.0; 2], add)
+    };
+    let moment = |curvature: f64| {
+        // The least strain on top that gives the force.
+        let tops = (0..=400).map(|k| 3.6e-3 * f64::from(k) / 400.0);
+        let [mut low, mut high] = [0.0, tops.clone().find(|&t| of(t, curvature)[0] >= axial)?];
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            if of(middle, curvature)[0] < axial { low = middle } else { high = middle }
+        }
+        Some(of(high, curvature)[1])
+    };
+    (1..600).filter_map(|k| moment(1e-4 * f64::from(k))).fold(0.0, f64::max)
+}
+
+#[test]
+#[ignore = "minutes"]
+fn bending_with_axial_force() {
+    let only: Option<f64> = std::env::var("EXPERIMENT_ONLY").ok().map(|n| n.parse().unwrap());
+    for axial in [0.0, 1000.0, 2000.0, 3500.0] {
+        if only.is_some_and(|n| n != axial) {
+            continue;
+        }
+        let found = strength(&scene(axial), None);
+        let (force, moved) = (found.peak.load_n, found.peak.displacement_m);
+        // Under a jack that presses over a length the moment in the middle is less than under a
+        // point.
+        let moment = force * (ARM - 0.5 * PLATE) + 1e3 * axial * moved;
+        let section = by_fibres(1e3 * axial);
+        println!(
+            "  N {axial:.0} kN: {:.1} kNm at {:.1} mm, by fibres {:.1}: {:.3}; {} ({}); {}",
+            1e-3 * moment,
+            1e3 * moved,
+            1e-3 * section,
+            moment / section,
+            found.mode.words(),
+            found.because,
+            found.ended
+        );
+    }
+}
