@@ -13,7 +13,7 @@
 //! test is exact on distorted meshes. The nine unknowns are private to the element and condensed:
 //! f_α(u, α) = 0 defines α(u), ∂α/∂u = −K_αα⁻¹ K_αu, and K = K_uu − K_uα K_αα⁻¹ K_αu.
 
-use super::ElementError;
+use super::{Element, ElementError, assumed};
 use crate::tensor::{Tangent, Voigt};
 use glam::{DMat3, DVec3};
 use nalgebra::{SMatrix, SVector};
@@ -62,6 +62,8 @@ pub enum Kind {
     /// Volume change averaged over the element (B-bar; Hughes 1980): for flow that keeps the
     /// volume. Locks in bending all the same.
     MeanDilatation,
+    /// Shear strain that does not see bending ([`super::assumed`]); for bricks that soften.
+    Assumed,
     /// Incompatible modes (C3D8I).
     #[default]
     Incompatible,
@@ -140,6 +142,18 @@ fn jacobian_of(nodes: &[DVec3; 8], slopes: &[DVec3; 8]) -> DMat3 {
         sum.z_axis += d.z * *x;
     }
     sum
+}
+
+/// Gradients of the nodes' shapes (1/m).
+///
+/// # Errors
+/// [`ElementError::Inverted`].
+pub(super) fn gradients(nodes: &[DVec3; 8], natural: DVec3) -> Result<[DVec3; 8], ElementError> {
+    let slopes = slopes(natural);
+    let matrix = jacobian_of(nodes, &slopes);
+    right_way_round(matrix.determinant(), 0)?;
+    let inverse = matrix.inverse().transpose();
+    Ok(slopes.map(|slope| inverse * slope))
 }
 
 /// Natural coordinates of a point (Newton from the centre); also answers somewhat outside the
@@ -242,6 +256,11 @@ pub(crate) fn linearize(
         Kind::Plain => {
             sweep(&Map::new(nodes, DVec3::ZERO)?, points, &columns::<8>(u, &[]), &mut law)?.plain()
         }
+        Kind::Assumed => {
+            let Element { stiffness, force } = assumed::integrate(nodes, u, law)?;
+            let (follow, step) = ([[0.0; 24]; 9], [0.0; 9]);
+            Ok(Solid { stiffness, force, follow, step, unsettled: 0.0 })
+        }
         Kind::MeanDilatation => {
             sweep(&Map::averaged(nodes)?, points, &columns::<8>(u, &[]), &mut law)?.plain()
         }
@@ -312,6 +331,9 @@ pub(crate) fn stress_gauge(strain: &[[f64; 24]; 6], tangent: &Tangent) -> [[f64;
 /// # Errors
 /// [`ElementError::Inverted`].
 pub(crate) fn rows(kind: Kind, nodes: &[DVec3; 8], natural: DVec3) -> Result<Rows, ElementError> {
+    if kind == Kind::Assumed {
+        return Ok(Rows { nodes: assumed::rows(nodes, natural)?, modes: [[0.0; 9]; 6] });
+    }
     let map = if kind == Kind::MeanDilatation {
         Map::averaged(nodes)?
     } else {

@@ -9,7 +9,7 @@
 //!
 //! | module | element |
 //! |---|---|
-//! | [`hex8`] | brick of eight nodes: plain, mean dilatation, incompatible modes; its loads are in [`load`], its scalar matrices in [`scalar`] |
+//! | [`hex8`] | brick of eight nodes: plain, mean dilatation, incompatible modes; its loads are in [`load`], its scalar matrices in [`scalar`]; [`assumed`] is its shear where it softens |
 //! | [`layered`] | brick whose layers are born in turn |
 //! | [`rod`] | bar of two nodes; [`embed`] lays bars and tendons through bricks, bonded or slipping |
 //! | [`interface`] | joint of zero thickness between two faces |
@@ -17,6 +17,7 @@
 //! | [`shell`] | MITC4 shell with drilling rotations |
 //! | [`turn`] | what makes a brick, and steel in it, turn with what they are in |
 
+pub(crate) mod assumed;
 pub mod embed;
 pub mod hex8;
 pub(crate) mod interface;

@@ -162,7 +162,7 @@ impl System<'_> {
     /// How a brick moves on from here: the modes of a damaged one stand still.
     fn moving(&self, hex: usize, history: &History) -> Kind {
         match self.model.kind {
-            Kind::Incompatible if history.points[hex].is_damaged() => Kind::Plain,
+            Kind::Incompatible if history.points[hex].is_damaged() => Kind::Assumed,
             kind => kind,
         }
     }

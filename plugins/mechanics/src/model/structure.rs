@@ -773,7 +773,8 @@ fn since_birth(history: &History, element: u32, mut u: [f64; 24]) -> [f64; 24] {
 
 /// A damaged brick: its modes stay as they were when it was sound. Free, they would let the strain
 /// localise between the points of one element, where a crack dissipates half of what the crack band
-/// foresees (Winkler's panel with 65 N/m then breaks at 5.3 kN instead of 6.2).
+/// foresees (Winkler's panel with 65 N/m then breaks at 5.3 kN instead of 6.2). Nor may shear that
+/// is not there hold it where it bends.
 fn stiffened(
     corners: &[DVec3; 8],
     u: &[f64; 24],
@@ -785,5 +786,5 @@ fn stiffened(
         *held = hex8::rows(Kind::Incompatible, corners, natural)?.strain(&[0.0; 24], modes);
     }
     let law = |point: usize, strain: &Voigt| law(point, &tensor::add(strain, &held[point]));
-    hex8::integrate(Kind::Plain, corners, u, &mut Modes::default(), law)
+    hex8::integrate(Kind::Assumed, corners, u, &mut Modes::default(), law)
 }

@@ -1,0 +1,179 @@
+//! A brick whose shear strain does not see bending: what a plain brick lets vary along the two edges
+//! that it shears, it takes from the middle of them (assumed natural strains: MacNeal 1982, Dvorkin
+//! and Bathe 1984). A plain brick that bends is held by shear that is not there, its incompatible
+//! modes would free it; but in a brick that softens they would let one crack be two halves. Normal
+//! strain is that of the plain brick, so that what softens does so over the whole of it.
+//!
+//! In axes of the brick's own, orthonormal and along its edges as nearly as can be, γ₁₂ at (ξ, η, ζ)
+//! is that at (0, 0, ζ): constant strain stays exact whatever the shape, and twisting keeps its
+//! stiffness.
+
+use glam::{DMat3, DVec3};
+
+use super::{
+    Element, ElementError,
+    hex8::{GAUSS, gradients, jacobian},
+};
+use crate::tensor::{self, Frame, Tangent, Voigt};
+
+/// The planes of each component of shear, and the edge across both.
+const PAIRS: [(usize, usize, usize); 3] = [(0, 1, 2), (1, 2, 0), (2, 0, 1)];
+
+/// Strain at a natural coordinate as rows over the nodes' displacements (1/m).
+///
+/// # Errors
+/// [`ElementError::Inverted`].
+pub(crate) fn rows(nodes: &[DVec3; 8], natural: DVec3) -> Result<[[f64; 24]; 6], ElementError> {
+    rows_in(nodes, natural, &axes(nodes))
+}
+
+/// Stiffness and internal force. The law is that of [`super::hex8::integrate`].
+///
+/// # Errors
+/// As there.
+pub(crate) fn integrate(
+    nodes: &[DVec3; 8],
+    u: &[f64; 24],
+    mut law: impl FnMut(usize, &Voigt) -> (Voigt, Tangent),
+) -> Result<Element<24>, ElementError> {
+    let axes = axes(nodes);
+    let mut sum = Element::zero();
+    for (point, natural) in GAUSS.into_iter().enumerate() {
+        let rows = rows_in(nodes, natural, &axes)?;
+        let strain = rows.map(|row| row.iter().zip(u).map(|(r, u)| r * u).sum());
+        let (stress, tangent) = law(point, &strain);
+        sum.add(&rows, &stress, &tangent, jacobian(nodes, natural).determinant());
+    }
+    sum.finite()
+}
+
+/// The orthonormal axes nearest to the three mean edges: the first along the first, the second in
+/// the plane of the first two.
+fn axes(nodes: &[DVec3; 8]) -> DMat3 {
+    let edges = jacobian(nodes, DVec3::ZERO);
+    let first = edges.x_axis.normalize_or_zero();
+    let third = first.cross(edges.y_axis).normalize_or_zero();
+    DMat3::from_cols(first, third.cross(first), third)
+}
+
+fn rows_in(
+    nodes: &[DVec3; 8],
+    natural: DVec3,
+    axes: &DMat3,
+) -> Result<[[f64; 24]; 6], ElementError> {
+    // Gradients along the brick's axes.
+    let along = |natural: DVec3| {
+        gradients(nodes, natural).map(|all| all.map(|g| (axes.transpose() * g).to_array()))
+    };
+    let here = along(natural)?;
+    let mut local = [[0.0; 24]; 6];
+    let mut put = |row: usize, node: usize, along: DVec3, by: f64| {
+        (0..3).for_each(|c| local[row][3 * node + c] += by * along[c]);
+    };
+    for (node, slopes) in here.iter().enumerate() {
+        (0..3).for_each(|i| put(i, node, axes.col(i), slopes[i]));
+    }
+    for (row, (i, j, across)) in (3..).zip(PAIRS) {
+        let mut middle = DVec3::ZERO;
+        middle[across] = natural[across];
+        for (node, slopes) in along(middle)?.iter().enumerate() {
+            put(row, node, axes.col(i), slopes[j]);
+            put(row, node, axes.col(j), slopes[i]);
+        }
+    }
+    Ok(in_the_world(&local, axes))
+}
+
+/// Strains along the brick's axes as strains along the world's.
+fn in_the_world(local: &[[f64; 24]; 6], axes: &DMat3) -> [[f64; 24]; 6] {
+    if *axes == DMat3::IDENTITY {
+        return *local;
+    }
+    // Rows: the world's axes in the brick's.
+    let back: Frame = axes.to_cols_array_2d();
+    let back = tensor::transposed(&back);
+    let mut world = [[0.0; 24]; 6];
+    for column in 0..24 {
+        let strain: Voigt = std::array::from_fn(|k| local[k][column]);
+        let turned = tensor::rotate_strain(&strain, &back);
+        (0..6).for_each(|k| world[k][column] = turned[k]);
+    }
+    world
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::element::hex8::{self, CORNERS, Kind, Modes};
+
+    fn skewed() -> [DVec3; 8] {
+        let turn = DMat3::from_rotation_x(0.4) * DMat3::from_rotation_z(-0.7);
+        let mut nodes = CORNERS.map(|c| turn * (DVec3::new(0.05, 0.07, 0.04) * c));
+        nodes[2] += DVec3::new(0.004, -0.006, 0.003);
+        nodes[7] += DVec3::new(-0.005, 0.002, 0.006);
+        nodes
+    }
+
+    fn displaced(nodes: &[DVec3; 8], field: impl Fn(DVec3) -> DVec3) -> [f64; 24] {
+        let all: Vec<f64> = nodes.iter().flat_map(|p| field(*p).to_array()).collect();
+        all.try_into().unwrap()
+    }
+
+    /// Constant strain is exact in a brick of any shape, and turning makes none.
+    #[test]
+    fn constant_strain_and_no_strain_are_exact() {
+        let nodes = skewed();
+        let wanted: Voigt = [1e-3, -2e-3, 5e-4, 8e-4, -3e-4, 1.2e-3];
+        let field = |p: DVec3| {
+            let [x, y, z, xy, yz, zx] = wanted;
+            DVec3::new(
+                x * p.x + 0.5 * xy * p.y + 0.5 * zx * p.z,
+                0.5 * xy * p.x + y * p.y + 0.5 * yz * p.z,
+                0.5 * zx * p.x + 0.5 * yz * p.y + z * p.z,
+            )
+        };
+        let turned = |p: DVec3| DVec3::new(3e-3, -2e-3, 1e-3).cross(p) + DVec3::splat(0.01);
+        for natural in GAUSS {
+            let rows = rows(&nodes, natural).unwrap();
+            let strain = |u: &[f64; 24]| rows.map(|r| r.iter().zip(u).map(|(r, u)| r * u).sum());
+            let found: Voigt = strain(&displaced(&nodes, field));
+            assert!(found.iter().zip(wanted).all(|(f, w)| (f - w).abs() < 1e-12), "{found:?}");
+            let still: Voigt = strain(&displaced(&nodes, turned));
+            assert!(still.iter().all(|f: &f64| f.abs() < 1e-12), "{still:?}");
+        }
+    }
+
+    /// Bent about each of its axes, a brick of edges a has the energy of a bent bar, E I κ² a/2 (a
+    /// plain one half as much again and more), wherever it is turned to; and nothing but moving as
+    /// a whole costs no energy.
+    #[test]
+    fn bending_makes_no_shear() {
+        let (e, a) = (30e9, 0.1);
+        let hooke = tensor::stiffness(e, 0.0);
+        let law = |_: usize, strain: &Voigt| (tensor::apply(&hooke, strain), hooke);
+        let turn = DMat3::from_rotation_y(0.3) * DMat3::from_rotation_x(1.1);
+        let nodes = CORNERS.map(|c| turn * (0.5 * a * c));
+        let energy = |k: &[[f64; 24]; 24], u: &[f64; 24]| {
+            let force = k.map(|row| row.iter().zip(u).map(|(k, u)| k * u).sum::<f64>());
+            0.5 * force.iter().zip(u).map(|(f, u)| f * u).sum::<f64>()
+        };
+        let assumed = integrate(&nodes, &[0.0; 24], law).unwrap().stiffness;
+        let plain =
+            hex8::integrate(Kind::Plain, &nodes, &[0.0; 24], &mut Modes::default(), law).unwrap();
+        let by_hand = 0.5 * e * a.powi(4) / 12.0 * a;
+        for (i, j) in [(0, 1), (1, 2), (2, 0), (1, 0), (2, 1), (0, 2)] {
+            let field = |p: DVec3| {
+                let local = turn.transpose() * p;
+                // What the corners can show of u_i = −x_i x_j, u_j = x_i²/2.
+                turn * (DVec3::AXES[i] * (-local[i] * local[j]))
+            };
+            let u = displaced(&nodes, field);
+            assert!((energy(&assumed, &u) / by_hand - 1.0).abs() < 1e-9);
+            assert!(energy(&plain.stiffness, &u) / by_hand > 1.4);
+        }
+        let matrix = nalgebra::SMatrix::<f64, 24, 24>::from_fn(|r, c| assumed[r][c]);
+        let values = matrix.symmetric_eigenvalues();
+        let free = values.iter().filter(|v| **v < 1e-9 * values.max()).count();
+        assert_eq!(free, 6, "{values}");
+    }
+}
