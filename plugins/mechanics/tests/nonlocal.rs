@@ -139,14 +139,14 @@ fn inclination(slope: f64, regularisation: Regularisation) -> f64 {
     (weighed(&|p| (p.x - x) * (p.y - y)) / weighed(&|p| (p.y - y).powi(2))).atan().to_degrees()
 }
 
-/// Pulled along x it cracks across, whichever way the elements lie. A crack band follows them.
+/// Pulled along x it cracks across, whichever way the elements lie; a crack band nearly so.
 #[test]
 fn a_crack_does_not_follow_the_mesh() {
     let slope = 30_f64.to_radians().tan();
     let [straight, found, band] = [(0.0, WIDER), (slope, WIDER), (slope, Regularisation::Band)]
         .map(|(slope, how)| inclination(slope, how));
     assert!(straight.abs() < 1.0 && found.abs() < 5.0, "{straight} {found}");
-    assert!(band > 8.0, "{band}");
+    assert!(band.abs() < 8.0, "{band}");
 }
 
 /// A length that the elements cannot resolve, or at which a crack would be too brittle, is refused

@@ -39,7 +39,14 @@ fn torn(n: usize, slim: f64, angle: f64) -> f64 {
     let mut model =
         Model { bodies: vec![concrete(3e6), concrete(STRENGTH)], mesh, ..Model::default() };
     model.holds = first.iter().flat_map(|&n| (0..3).map(move |c| (n, c))).collect();
-    model.loads.push(kilonewton(&last, along));
+    // Its end is moved as one, by a metre: free, it would turn, and tear on one side first.
+    model.holds.extend(last.iter().map(|&n| (n, 2)));
+    let both = last.iter().flat_map(|&n| (0..2).map(move |c| (n, c, along[usize::from(c)])));
+    model.loads.push(Load {
+        name: "moved".into(),
+        action: Action::Displacement(both.collect()),
+        history: vec![(0.0, 0.0)],
+    });
     let component = |nodes: &[u32], sign: f64| -> Vec<(u32, u8, f64)> {
         (0..2).flat_map(|c| mean(nodes, c, sign * along[usize::from(c)])).collect()
     };
@@ -52,11 +59,11 @@ fn torn(n: usize, slim: f64, angle: f64) -> f64 {
         let opening = 1e-7 * f64::powf(5.0 * FRACTURE / STRENGTH / 1e-7, f64::from(k) / 100.0);
         march
             .advance(f64::from(k + 1), opening - opened, &Job::default(), |history, _| {
-                let end = component(&last, 1.0)
-                    .iter()
-                    .map(|&(n, c, w)| w * history.x[3 * n as usize + usize::from(c)])
-                    .sum();
-                let now = [1e3 * history.factor, end];
+                let sum = |of: &[f64]| -> f64 {
+                    let each = component(&last, 1.0).into_iter();
+                    each.map(|(n, c, w)| w * of[3 * n as usize + usize::from(c)]).sum()
+                };
+                let now = [sum(&history.force) * last.len() as f64, sum(&history.x)];
                 work += 0.5 * (now[0] + before[0]) * (now[1] - before[1]);
                 before = now;
                 Ok(())
@@ -69,15 +76,17 @@ fn torn(n: usize, slim: f64, angle: f64) -> f64 {
 
 #[test]
 fn work_is_that_of_the_crack_for_bricks_of_any_shape() {
+    let mut worst = 0.0_f64;
     for (n, slim) in [(4, 0.4), (10, 1.0), (10, 3.0), (20, 0.5)] {
         for angle in [0.0, std::f64::consts::FRAC_PI_4] {
             let work = torn(n, slim, angle);
             println!(
                 "{n} bricks, {slim} times as wide as long, turned by {angle:.2}: work/(G_f A) {work:.4}"
             );
-            assert!((work - 1.0).abs() < 0.01, "{n} {slim} {angle}: {work}");
+            worst = worst.max((work - 1.0).abs());
         }
     }
+    assert!(worst < 0.01, "{worst}");
 }
 
 #[test]

@@ -7,7 +7,7 @@ use intrados_mechanics::{
     analysis::Observer,
     analyze,
     member::Along,
-    model::{Failure, History, Point, Step},
+    model::{History, Point, Step},
     prepare,
 };
 use intrados_scene::Scene;

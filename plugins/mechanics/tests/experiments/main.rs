@@ -38,6 +38,7 @@ mod interaction;
 mod panel;
 mod series;
 mod shear;
+mod slender;
 
 use std::{
     f64::consts::PI,
@@ -207,13 +208,36 @@ struct Pushed {
 /// more; the factor of the load `load` is found. The first unit of time is for loads that come
 /// before.
 fn pushed(model: &Model, load: usize, row: Vec<(u32, u8, f64)>, step: f64, last: f64) -> Pushed {
+    pushed_in(model, load, row, [step, last], false)
+}
+
+/// The same of second order: equilibrium where things have moved to.
+fn pushed_where_it_has_moved_to(
+    model: &Model,
+    load: usize,
+    row: Vec<(u32, u8, f64)>,
+    step: f64,
+    last: f64,
+) -> Pushed {
+    pushed_in(model, load, row, [step, last], true)
+}
+
+fn pushed_in(
+    model: &Model,
+    load: usize,
+    row: Vec<(u32, u8, f64)>,
+    [step, last]: [f64; 2],
+    turned: bool,
+) -> Pushed {
     let clock = std::time::Instant::now();
     let structure = System::new(model).unwrap();
     let tolerance = std::env::var("EXPERIMENT_TOLERANCE").map_or(1e-2, |t| t.parse().unwrap());
     let settings =
         MarchSettings { tolerance, loose: 3.0, iterations: 40, ..MarchSettings::default() };
     let drive = raised(load, row.clone());
-    let mut march = March::new(&structure, structure.rest(0.0), drive, settings);
+    let mut rest = structure.rest(0.0);
+    rest.turned = turned;
+    let mut march = March::new(&structure, rest, drive, settings);
     let (mut curve, mut yields, mut peak, mut steps, mut jumps) =
         (vec![(0.0, 0.0)], None, 0.0_f64, 0, 0);
     if model.loads.len() > 1 {

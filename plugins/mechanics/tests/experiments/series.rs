@@ -10,7 +10,7 @@ use intrados_mechanics::{
     analysis::Observer,
     analyze,
     member::Along,
-    model::{Failure, History, Point, Step},
+    model::{History, Point, Step},
     prepare,
     strength::Strength,
 };
