@@ -62,24 +62,44 @@ impl Piece {
         Ok(std::array::from_fn(|c| (second[c / 3] - first[c / 3]) * along[c % 3] / length))
     }
 
-    /// The bonded piece: stiffness and force on the host's 24 unknowns, one point (the strain is
-    /// constant). `law(strain)` answers stress, initial stress included, and tangent (Pa). Add
-    /// (A_s) or, where the concrete that the bar displaces should not count, give the law of steel
-    /// less concrete.
+    /// Adds the bonded piece to stiffness (24 × 24, by rows) and force of its host, one point (the
+    /// strain is constant). `law(strain)` answers stress, initial stress included, and tangent (Pa).
     ///
     /// # Errors
     /// As [`rod`].
-    pub(crate) fn bonded(
+    pub(crate) fn add_bonded(
+        &self,
+        u: &[f64; 24],
+        area: f64,
+        law: impl FnOnce(f64) -> (f64, f64),
+        [k, f]: [&mut [f64]; 2],
+    ) -> Result<(), ElementError> {
+        let row = self.strain_row()?;
+        let (stress, tangent) = law(product(&row, u));
+        let volume = area * self.length();
+        if !(volume * stress).is_finite() || !(volume * tangent).is_finite() {
+            return Err(ElementError::NotFinite);
+        }
+        for ((force, stiffness), r) in f.iter_mut().zip(k.chunks_exact_mut(24)).zip(&row) {
+            *force += volume * stress * r;
+            let by = volume * tangent * r;
+            stiffness.iter_mut().zip(&row).for_each(|(k, c)| *k += by * c);
+        }
+        Ok(())
+    }
+
+    /// The same alone.
+    #[cfg(test)]
+    fn bonded(
         &self,
         u: &[f64; 24],
         area: f64,
         law: impl FnOnce(f64) -> (f64, f64),
     ) -> Result<Element<24>, ElementError> {
-        let row = self.strain_row()?;
-        let (stress, tangent) = law(product(&row, u));
         let mut element = Element::zero();
-        element.add(&[row], &[stress], &[[tangent]], area * self.length());
-        element.finite()
+        let both = [element.stiffness.as_flattened_mut(), &mut element.force[..]];
+        self.add_bonded(u, area, law, both)?;
+        Ok(element)
     }
 
     /// The piece with slip: the host's 24 unknowns, then the slips s₁, s₂ of its ends (m, positive

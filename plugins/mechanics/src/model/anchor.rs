@@ -80,6 +80,11 @@ impl Steel {
             .filter_map(|(end, plate)| Some((end, plate.as_ref()?)))
     }
 
+    /// Whether a piece does as the brick does that it lies in: it neither slips nor ends in a plate.
+    pub(super) fn is_bonded(&self, piece: usize) -> bool {
+        self.bond.is_none() && self.plates(piece).next().is_none()
+    }
+
     /// Nodes under the plates that a piece ends in.
     pub(super) fn under(&self, piece: usize) -> impl Iterator<Item = u32> {
         self.plates(piece).flat_map(|(_, plate)| plate.shares.iter().map(|share| share.0))
@@ -136,11 +141,8 @@ impl System<'_> {
         x: &[f64],
         k: &mut [f64],
         f: &mut [f64],
-    ) -> Result<bool, Failure> {
+    ) -> Result<(), Failure> {
         let steel = &self.model.steel[bar];
-        if steel.plates(piece).next().is_none() {
-            return Ok(false);
-        }
         let of = &steel.pieces[piece];
         let mut row = of
             .strain_row()
@@ -167,6 +169,6 @@ impl System<'_> {
                 .enumerate()
                 .for_each(|(j, of_j)| k[i * row.len() + j] = volume * tangent * of_i * of_j);
         }
-        Ok(true)
+        Ok(())
     }
 }

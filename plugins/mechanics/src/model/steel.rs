@@ -2,7 +2,7 @@
 
 use super::Plate;
 use crate::{
-    element::{Element, ElementError, rod::Piece},
+    element::{ElementError, rod::Piece},
     material::{
         bond::{Bond, BondState},
         chloride::corroded,
@@ -206,19 +206,21 @@ impl Steel {
         self.rust.as_ref().map_or(self.area, |rust| self.area * rust.left(since(rust), time))
     }
 
-    /// Stiffness and force of a piece on its host.
-    pub(super) fn element(
+    /// Adds stiffness and force of a bonded piece to those of its host.
+    pub(super) fn add(
         &self,
         piece: usize,
         u: &[f64; 24],
         mean: f64,
         before: &Piecework,
         span: [f64; 2],
-    ) -> Result<Element<24>, ElementError> {
-        self.pieces[piece].bonded(u, self.area_at(piece, span[1]), |strain| {
+        both: [&mut [f64]; 2],
+    ) -> Result<(), ElementError> {
+        let law = |strain: f64| {
             let (stress, tangent, _) = self.answer(piece, strain, mean, before, span);
             (stress, tangent)
-        })
+        };
+        self.pieces[piece].add_bonded(u, self.area_at(piece, span[1]), law, both)
     }
 }
 
@@ -255,7 +257,10 @@ mod tests {
         let u: [f64; 24] =
             std::array::from_fn(|i| if i % 3 == 0 { 1e-3 * corners[i / 3].x } else { 0.0 });
         let force = |time: f64| {
-            steel.element(0, &u, f64::NAN, &steel.rest()[0], [0.0, time]).unwrap().force
+            let (mut k, mut force) = ([0.0; 24 * 24], [0.0; 24]);
+            let before = &steel.rest()[0];
+            steel.add(0, &u, f64::NAN, before, [0.0, time], [&mut k, &mut force]).unwrap();
+            force
         };
         let (sound, rusty) = (force(9.9 * YEAR), force(30.0 * YEAR));
         let left = (1.0 - 2.0 * 20.0 * 11.6e-6 / 8e-3_f64).powi(2);

@@ -36,7 +36,9 @@ pub struct System<'m> {
     law_of: Vec<u32>,
     laws: Vec<Law>,
     pub(super) elements: Connectivity,
-    /// Which bar, and which piece of it, each element after the bricks is.
+    /// Of each brick the pieces of bars that do as it does: which bar, which piece of it.
+    bonded: Vec<Vec<(u32, u32)>>,
+    /// The same of each element after the bricks: pieces that slip or end in plates.
     pieces: Vec<(u32, u32)>,
     /// Share of each brick that is concrete: steel displaces the rest.
     concrete: Vec<f64>,
@@ -110,11 +112,15 @@ impl<'m> System<'m> {
         }
         let (law_of, laws) = Law::of_bricks(mesh, &model.bodies, model.regularisation)?;
         let mut elements: Connectivity = mesh.hexes.iter().map(|hex| hex.nodes).collect();
-        let mut pieces = Vec::new();
+        let (mut bonded, mut pieces) = (vec![Vec::new(); mesh.hexes.len()], Vec::new());
         let rotations = Rotations::new(mesh);
         let slips = Slips::new(model, (mesh.nodes.len() + rotations.places(mesh).count()) as u32);
         for (bar, steel) in model.steel.iter().enumerate() {
             for (piece, host) in steel.pieces.iter().map(|piece| piece.host).enumerate() {
+                if steel.is_bonded(piece) {
+                    bonded[host].push((bar as u32, piece as u32));
+                    continue;
+                }
                 pieces.push((bar as u32, piece as u32));
                 let mut nodes = slips.nodes(bar, piece, &mesh.hexes[host].nodes);
                 nodes.extend(steel.under(piece));
@@ -152,6 +158,7 @@ impl<'m> System<'m> {
             law_of,
             laws,
             elements,
+            bonded,
             pieces,
             concrete,
             joined,
@@ -396,6 +403,7 @@ impl<'m> System<'m> {
                     let solid = self.brick(e, trial, &moved.local, &mut modes, |_, _| {})?;
                     k.copy_from_slice(solid.stiffness.as_flattened());
                     f.copy_from_slice(&solid.force);
+                    self.add_bonded(e, &moved, &means, trial, [&mut *k, &mut *f])?;
                     self.bring_back(e, &moved, [].into_iter(), x, k, f);
                 }
                 return Ok(());
@@ -408,25 +416,10 @@ impl<'m> System<'m> {
                     self.model.steel[bar as usize].pieces[piece as usize].host,
                 );
                 if self.is_alive(host, trial.time) {
-                    let before = &trial.history.steel[bar as usize][piece as usize];
                     let moved = self.moved(host, trial.history, x)?;
                     let (this, mean) = ([bar as usize, piece as usize], means[bar as usize]);
-                    if !self.slipping(this, &moved.local, trial, x, k, f)?
-                        && !self.anchored(this, &moved, mean, trial, x, k, f)?
-                    {
-                        let element = steel.element(
-                            piece as usize,
-                            &moved.local,
-                            mean,
-                            before,
-                            [trial.history.time, trial.time],
-                        );
-                        let element = element.map_err(|source| Failure::Element {
-                            element: steel.name.clone(),
-                            source,
-                        })?;
-                        k.copy_from_slice(element.stiffness.as_flattened());
-                        f.copy_from_slice(&element.force);
+                    if !self.slipping(this, &moved.local, trial, x, k, f)? {
+                        self.anchored(this, &moved, mean, trial, x, k, f)?;
                     }
                     self.bring_back(host, &moved, steel.under(piece as usize), x, k, f);
                 }
@@ -455,6 +448,26 @@ impl<'m> System<'m> {
             }
             Ok(())
         })
+    }
+
+    /// Adds to stiffness and force of a brick, in its own axes, those of the bars that do as it does.
+    fn add_bonded(
+        &self,
+        hex: usize,
+        moved: &Moved,
+        means: &[f64],
+        trial: Trial,
+        [k, f]: [&mut [f64]; 2],
+    ) -> Result<(), Failure> {
+        for &(bar, piece) in &self.bonded[hex] {
+            let (bar, piece) = (bar as usize, piece as usize);
+            let (steel, before) = (&self.model.steel[bar], &trial.history.steel[bar][piece]);
+            let span = [trial.history.time, trial.time];
+            steel
+                .add(piece, &moved.local, means[bar], before, span, [&mut *k, &mut *f])
+                .map_err(|source| Failure::Element { element: steel.name.clone(), source })?;
+        }
+        Ok(())
     }
 
     /// The history after a trial that has converged at `x` with internal forces `force`.
