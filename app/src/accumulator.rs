@@ -108,6 +108,11 @@ impl Accumulator {
         }
     }
 
+    /// Whether every walk of its parts was walked.
+    pub(crate) fn is_whole(&self) -> bool {
+        self.exposures().flat_map(Exposure::unfinished).next().is_none()
+    }
+
     fn exposures(&self) -> impl Iterator<Item = &Exposure> {
         let (picture, readings) = match &self.content {
             Content::Picture { plate, .. } => (Some(plate.exposures().iter().flatten()), None),
@@ -176,6 +181,20 @@ impl Accumulator {
         }
     }
 
+    /// A hash of all that is the same in every run: everything but CPU-seconds.
+    pub(crate) fn digest(mut self) -> Result<String, Failure> {
+        match &mut self.content {
+            Content::Picture { plate, .. } => plate.forget_clock(),
+            Content::Readings { primal, dual, training, .. } => {
+                *training = 0.0;
+                primal.iter_mut().chain(dual).for_each(|e| e.cpu_seconds = 0.0);
+            }
+        }
+        let bytes = postcard::to_stdvec(&self)
+            .map_err(|e| Failure::Internal(format!("cannot store the work: {e}")))?;
+        Ok(blake3::hash(&bytes).to_hex().to_string())
+    }
+
     fn is_consistent(&self) -> bool {
         match &self.content {
             Content::Picture { plate, .. } => plate.is_consistent(),
@@ -212,7 +231,7 @@ impl Accumulator {
     }
 
     /// Adds the walks of another one of the same work.
-    fn merge(&mut self, other: &Self) -> Result<(), String> {
+    pub(crate) fn merge(&mut self, other: &Self) -> Result<(), String> {
         if self.scene_hash != other.scene_hash {
             return Err(format!(
                 "it is of another scene ({} {})",

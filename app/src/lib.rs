@@ -20,6 +20,7 @@
 
 mod accumulator;
 mod args;
+mod campaign;
 mod commands;
 mod console;
 #[cfg(feature = "desktop")]

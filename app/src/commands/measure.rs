@@ -37,7 +37,7 @@ pub(crate) struct Report {
     target_reached: Option<bool>,
     /// When an error bar counts as converged.
     thresholds: Thresholds,
-    meters: Vec<MeterReading>,
+    pub(crate) meters: Vec<MeterReading>,
     /// Where the variance of steered walks comes from, worst first; only if asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     explain: Option<Vec<Culprit>>,

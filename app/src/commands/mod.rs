@@ -2,23 +2,24 @@
 
 mod analyze;
 mod attach;
+mod campaign;
 mod detach;
 mod detect;
 mod experiment;
 mod import;
 mod info;
-mod measure;
+pub(crate) mod measure;
 mod merge;
 mod new;
 mod photo;
 mod predict;
-mod render;
+pub(crate) mod render;
 mod scan;
 mod schema;
 mod validate;
 mod verify;
 mod view;
-mod walks;
+pub(crate) mod walks;
 mod whole;
 
 use crate::{
@@ -49,5 +50,6 @@ pub(crate) fn run(cli: &Cli, session: &Session) -> Result<Outcome, Failure> {
         Some(Command::Experiment(args)) => experiment::run(session, args),
         Some(Command::Verify) => verify::run(session),
         Some(Command::Merge(args)) => merge::run(session, args),
+        Some(Command::Campaign(args)) => campaign::run(session, args),
     }
 }

@@ -62,7 +62,7 @@ pub(crate) struct Report {
     target_rel_error: Option<f64>,
     target_reached: Option<bool>,
     shards: Shards,
-    files: Vec<String>,
+    pub(crate) files: Vec<String>,
 }
 
 /// A picture in progress, and where its state goes.
