@@ -668,6 +668,13 @@ pub(crate) struct Light {
     /// never. Learning takes at most half of what --spp and --time-limit allow
     #[arg(long, value_enum, default_value = "auto")]
     pub(crate) guide: GuideArg,
+    /// What steers the walks from a file, instead of learning it; learnt and written there if there
+    /// is none. Campaigns share it so
+    #[arg(long, value_name = "FILE")]
+    pub(crate) guide_from: Option<PathBuf>,
+    /// Learn what steers the walks into that file, and end
+    #[arg(long, hide = true, requires = "guide_from")]
+    pub(crate) learn_only: bool,
     /// Seed of all random numbers
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub(crate) seed: u64,

@@ -20,7 +20,6 @@
 
 mod accumulator;
 mod args;
-mod campaign;
 mod commands;
 mod console;
 #[cfg(feature = "desktop")]
@@ -31,6 +30,7 @@ mod output;
 mod picture;
 mod processor;
 mod progress;
+mod sealed;
 mod session;
 
 use std::{process::ExitCode, sync::Arc};

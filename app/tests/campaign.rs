@@ -19,7 +19,7 @@ use serde_json::Value;
 /// Walks of the bundled room, a quarter of a second in all.
 const WALKS: [&str; 8] = ["--", "--spp", "200", "--width", "32", "--height", "24", "--guide=off"];
 /// The same, so many that a unit of eight takes some tenths of a second.
-const MORE: [&str; 8] = ["--", "--spp", "2000", "--width", "32", "--height", "24", "--guide=off"];
+const MORE: [&str; 8] = ["--", "--spp", "1000", "--width", "32", "--height", "24", "--guide=off"];
 
 fn new(dir: &Path, command: &str, over: &str, split: usize, words: &[&str]) {
     let split = split.to_string();
@@ -88,6 +88,45 @@ fn units_give_the_same_bits_in_any_number_and_order() {
             results(&eight).iter().map(|r| fs::metadata(r).unwrap().modified().unwrap()).collect();
         assert_eq!(before, after);
     }
+}
+
+/// What steers walks is learnt once, before the units, and brings the bits that every shard would
+/// have that learns it for itself.
+#[test]
+fn units_share_what_steers_them() {
+    let words = ["--spp", "150", "--width", "16", "--height", "12", "--guide=on"];
+    let folder = tempfile::tempdir().unwrap();
+    let [one, three] = [1, 3].map(|split| {
+        let dir = folder.path().join(split.to_string());
+        new(&dir, "measure", "slit", split, &[&["--"], &words[..]].concat());
+        assert!(dir.join("guides/0.guide").is_file());
+        assert_eq!(code(&["campaign", "run", text(&dir), "--quiet"]), 0);
+        dir
+    });
+    assert_eq!(collected(&one), collected(&three));
+    let alone = folder.path().join("alone");
+    let mut parts = Vec::new();
+    for shard in ["0/2", "1/2"] {
+        let args = ["measure", "slit", "--shard", shard, "--out", text(&alone), "--quiet"];
+        assert_eq!(code(&[&args[..], &words].concat()), 0);
+        parts.push(alone.join(format!("slit.{}.acc", shard.replace('/', "of"))));
+    }
+    let merge = ["merge", text(&parts[0]), text(&parts[1]), "--out", text(&alone)];
+    let merged = run(&[&merge[..], &["--format", "json"]].concat());
+    let merged: Value = serde_json::from_slice(&merged.stdout).unwrap();
+    let results = fs::read(one.join("collected/results.json")).unwrap();
+    let rows = &serde_json::from_slice::<Value>(&results).unwrap()["rows"];
+    for (row, side) in [(0, "primal"), (1, "dual")] {
+        assert_eq!(rows[row]["side"], side);
+        assert_eq!(rows[row]["mean"], merged["meters"][0][side]["mean"], "{side}");
+    }
+
+    // A guide of other walks is refused.
+    let guide = one.join("guides/0.guide");
+    let other = ["measure", "slit", "--spp", "151", "--guide", "on", "--guide-from", text(&guide)];
+    let refused = run(&other);
+    assert_eq!(refused.status.code(), Some(65));
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("learnt for another scene"));
 }
 
 /// A signal ends a unit with 75 and a checkpoint; started again it goes on and has the bits of one

@@ -1,17 +1,39 @@
-//! `intrados campaign`: plans units of work, runs them, says how far they are, adds them up, and
-//! writes job files for schedulers.
+//! `intrados campaign`: work over many structures, or long work on one, as units that any scheduler
+//! can run.
+//!
+//! A *plan* lists pure units; a unit's id is a hash of all that its result depends on. A unit is an
+//! ordinary command that is run for a part of the work, in a folder of its own that gets its place
+//! by a rename once the result is whole. So workers share nothing but a folder, need not know each
+//! other, and may be killed at any moment. What is *collected* is added up in the plan's order.
+
+mod collect;
+mod folder;
+mod launch;
+mod network;
+mod page;
+mod parquet;
+mod plan;
+mod table;
+mod unit;
 
 use std::{path::Path, process::Command};
 
-use intrados_report::network;
+use intrados_report::network as page_of;
 use serde::Serialize;
 use serde_json::Value;
 
+use self::{
+    collect::{Collected, few},
+    folder::{Folder, State},
+    launch::{Engine, Wish},
+    plan::Plan,
+    table::Rows,
+    unit::Did,
+};
 use super::render;
 use crate::{
     accumulator::Content,
     args::{self, CampaignStep},
-    campaign::{self, Collected, Did, Engine, Folder, Plan, Rows, State, Wish, few},
     failure::{Failure, Outcome},
     output::{self, Files},
     session::Session,
@@ -38,8 +60,11 @@ struct Planned {
 }
 
 fn new(session: &Session, args: &args::CampaignNew) -> Result<Outcome, Failure> {
-    let plan = campaign::plan(session, args)?;
-    Folder::new(&args.dir).begin(&plan)?;
+    let plan = plan::plan(session, args)?;
+    let folder = Folder::new(&args.dir);
+    folder.may_begin(&plan)?;
+    unit::learn(session, &folder, &plan)?;
+    folder.begin(&plan)?;
     let planned = Planned {
         schema: "intrados.campaign-new/1",
         dir: args.dir.display().to_string(),
@@ -71,7 +96,7 @@ fn work(session: &Session, args: &args::CampaignRun) -> Result<Outcome, Failure>
         if session.job.is_cancelled() {
             return Ok(Outcome::ToBeContinued);
         }
-        match campaign::run(session, &folder, &plan, unit) {
+        match unit::run(session, &folder, &plan, unit) {
             Ok(Did::Stopped) => {
                 session.note(format_args!(
                     "unit {unit}: stopped; it goes on from here when it is started again"
@@ -136,7 +161,7 @@ fn status(session: &Session, args: &args::CampaignFolder) -> Result<Outcome, Fai
 }
 
 fn how_far(folder: &Folder, plan: &Plan) -> Result<Status, Failure> {
-    let states = campaign::states(folder, &plan.units);
+    let states = collect::states(folder, &plan.units);
     let count = |state: State| states.iter().filter(|s| **s == state).count();
     let mut seconds = Vec::new();
     let mut failed = Vec::new();
@@ -222,7 +247,7 @@ struct Summary {
 fn collect(session: &Session, args: &args::CampaignCollect) -> Result<Outcome, Failure> {
     let folder = Folder::new(&args.dir);
     let plan = folder.plan()?;
-    let all = campaign::collect(session, &folder, &plan, args.partial)?;
+    let all = collect::collect(session, &folder, &plan, args.partial)?;
     let out = args.out.clone().unwrap_or_else(|| args.dir.join("collected"));
     let mut files = output::begin(&out)?;
     let results = Results {
@@ -234,6 +259,7 @@ fn collect(session: &Session, args: &args::CampaignCollect) -> Result<Outcome, F
         rows: all.rows.objects(),
     };
     files.write("results.csv", all.rows.csv().as_bytes())?;
+    files.write("results.parquet", &parquet::parquet(&all.rows)?)?;
     if let Some(page) = page(&plan, &all)? {
         files.write("network.html", page.as_bytes())?;
     }
@@ -261,7 +287,7 @@ fn table(summary: &Summary, rows: &Rows) -> String {
     const COLUMNS: usize = 9;
     let columns = rows.columns.iter().take(COLUMNS).cloned().collect();
     let cells = |row: &Vec<Value>| -> Vec<String> {
-        row.iter().take(COLUMNS).map(campaign::cell).map(|c| c.chars().take(40).collect()).collect()
+        row.iter().take(COLUMNS).map(table::cell).map(|c| c.chars().take(40).collect()).collect()
     };
     let mut lines: Vec<Vec<String>> = vec![columns];
     lines.extend(rows.rows.iter().take(ROWS).map(cells));
@@ -291,24 +317,24 @@ fn page(plan: &Plan, all: &Collected) -> Result<Option<String>, Failure> {
     if plan.command != args::Job::Predict {
         return Ok(None);
     }
-    let items = campaign::items(&all.rows);
+    let items = page::items(&all.rows);
     let missing = match all.missing.len() {
         0 => None,
         n => Some(format!("{n} of {} units are missing from this page.", plan.units.len())),
     };
-    let page = network::Page {
+    let page = page_of::Page {
         title: plan.structures.first().filter(|_| plan.network.is_none()).map_or_else(
             || "A network of bridges".to_owned(),
             |s| format!("{} and {} others", s.name, plan.structures.len() - 1),
         ),
         version: env!("CARGO_PKG_VERSION").into(),
-        states: campaign::state_names(&all.rows),
+        states: page::state_names(&all.rows),
         is_assumed: plan.network.is_some(),
         ahead_years: plan.network.map(|n| n.settings.ahead_years),
         missing,
         items,
     };
-    network::html(&page).map(Some).map_err(|e| Failure::Internal(format!("the page: {e}")))
+    page_of::html(&page).map(Some).map_err(|e| Failure::Internal(format!("the page: {e}")))
 }
 
 /// Schema `intrados.campaign-launch/1`.
@@ -335,7 +361,7 @@ fn launch(session: &Session, args: &args::CampaignLaunch) -> Result<Outcome, Fai
         image: args.image.clone(),
         claim: args.claim.clone(),
     };
-    let job = campaign::job_files(&folder, &plan, &wish)?;
+    let job = launch::job_files(&folder, &plan, &wish)?;
     let place = args.dir.join("launch").join(job.folder);
     output::folder(&place)?;
     let mut written = Vec::new();

@@ -172,8 +172,15 @@ pub(crate) fn run(session: &Session, args: &args::Measure) -> Result<Outcome, Fa
         must_reach: false,
     };
     let rules = Rules::new(&args.stop, default);
-    let guide =
-        walks::guide(session, &opened.lit, &sensors, rule, &args.light, &rules)?.map(Arc::new);
+    let mut guide = walks::guide(session, &opened.lit, &sensors, rule, &args.light, &rules)?;
+    if args.light.learn_only {
+        return Ok(Outcome::Done);
+    }
+    // A guide that shards share was learnt once and is charged once.
+    if args.light.guide_from.is_some() && shard.index > 0 {
+        guide.iter_mut().for_each(|guide| guide.cpu_seconds = 0.0);
+    }
+    let guide = guide.map(Arc::new);
     let measurement = Measurement::new(
         opened.lit.clone(),
         sensors,

@@ -8,18 +8,18 @@ mod detect;
 mod experiment;
 mod import;
 mod info;
-pub(crate) mod measure;
+mod measure;
 mod merge;
 mod new;
 mod photo;
 mod predict;
-pub(crate) mod render;
+mod render;
 mod scan;
 mod schema;
 mod validate;
 mod verify;
 mod view;
-pub(crate) mod walks;
+mod walks;
 mod whole;
 
 use crate::{

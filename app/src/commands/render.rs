@@ -156,6 +156,9 @@ pub(crate) fn run(session: &Session, args: &args::Render) -> Result<Outcome, Fai
     } else {
         None
     };
+    if args.light.learn_only {
+        return Ok(Outcome::Done);
+    }
     let mut work = Picture {
         render: Render::guided(opened.lit.clone(), &camera, &settings, guide.as_ref()),
         scene: &opened.scene,

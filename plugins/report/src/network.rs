@@ -83,8 +83,15 @@ struct Shown<'a> {
     /// Parts of which nothing is forecast, by why.
     unknown: BTreeMap<&'a str, usize>,
     parts: usize,
-    expected: f64,
-    map: String,
+    map: Map,
+}
+
+/// Places as dots.
+#[derive(Default)]
+struct Map {
+    svg: String,
+    /// Places so far from all others that they are hardly right.
+    astray: Vec<String>,
 }
 
 /// The page.
@@ -100,7 +107,6 @@ pub fn html(page: &Page) -> Result<String, askama::Error> {
     let shown = Shown {
         page,
         parts: page.items.iter().filter(|i| i.damage.is_some()).count(),
-        expected: structures.iter().map(|s| s.poor).sum(),
         map: map(&structures),
         unknown,
         structures,
@@ -139,12 +145,29 @@ fn url(item: &Item) -> String {
     })
 }
 
+/// Where 98 of a hundred values are, and half as much again on either side: one wrong sign in a
+/// table of thousands must not make all others one dot.
+fn reach(mut values: Vec<f64>) -> [f64; 2] {
+    values.sort_by(f64::total_cmp);
+    let last = values.len().saturating_sub(1);
+    let at = |share: f64| values.get((share * last as f64).round() as usize).copied();
+    let (low, high) = (at(0.01).unwrap_or(0.0), at(0.99).unwrap_or(0.0));
+    let more = 0.5 * (high - low).max(0.02);
+    [low - more, high + more]
+}
+
 /// Places as dots, the worst on top: a degree of longitude is as long as at the middle latitude.
-fn map(structures: &[Structure<'_>]) -> String {
-    let places: Vec<([f64; 2], &Structure)> =
+fn map(structures: &[Structure<'_>]) -> Map {
+    let all: Vec<([f64; 2], &Structure)> =
         structures.iter().filter_map(|s| Some((s.worst.place?, s))).collect();
+    let reaches = [0, 1].map(|k| reach(all.iter().map(|(place, _)| place[k]).collect()));
+    let is_near = |place: &[f64; 2]| {
+        place.iter().zip(&reaches).all(|(x, [low, high])| (low..=high).contains(&x))
+    };
+    let (places, astray): (Vec<_>, Vec<_>) = all.into_iter().partition(|(p, _)| is_near(p));
+    let astray = astray.iter().map(|(_, s)| s.worst.structure.clone()).collect();
     if places.len() < 2 {
-        return String::new();
+        return Map { svg: String::new(), astray };
     }
     let range = |k: usize| {
         let values = places.iter().map(|(place, _)| place[k]);
@@ -180,7 +203,7 @@ fn map(structures: &[Structure<'_>]) -> String {
             ))
         );
     }
-    svg + "</svg>"
+    Map { svg: svg + "</svg>", astray }
 }
 
 /// The least and the most that a structure is probably poor.
@@ -250,5 +273,16 @@ mod tests {
         assert!(text.contains("no year") && text.contains("circle"));
         // Whatever a table says is text, and no part of the page.
         assert!(!text.contains("<a>") && text.contains("&lt;a&gt;"));
+    }
+
+    /// A place with a wrong sign is named and does not shrink the map.
+    #[test]
+    fn a_place_astray_is_named() {
+        let mut items: Vec<Item> =
+            (0..200).map(|k| item(&k.to_string(), 0.002 * f64::from(k))).collect();
+        items[7].place = Some([43.0, 80.0]);
+        let page = Page { items, ..Page::default() };
+        let map = map(&ranked(&page));
+        assert_eq!((map.astray, map.svg.matches("<circle").count()), (vec!["7".to_owned()], 199));
     }
 }

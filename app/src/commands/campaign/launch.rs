@@ -38,6 +38,9 @@ pub(crate) struct JobFiles {
 /// Most tasks if nobody says how many: Slurm's own limit of an array is 1001.
 const TASKS: u64 = 1000;
 
+/// How many times a task is started again that was killed.
+const KILLS: u32 = 20;
+
 /// What the files name.
 struct Names {
     program: String,
@@ -60,7 +63,7 @@ pub(crate) fn job_files(folder: &Folder, plan: &Plan, wish: &Wish) -> Result<Job
     Ok(match wish.engine {
         Engine::Slurm => slurm(&names, wish),
         Engine::HyperQueue => hyperqueue(&names, wish),
-        Engine::Kubernetes => kubernetes(&names, wish)?,
+        Engine::Kubernetes => kubernetes(&names, wish, plan)?,
         Engine::Local(processes) => local(&names, wish, processes),
     })
 }
@@ -90,6 +93,25 @@ fn string(word: &str) -> Result<String, Failure> {
     serde_json::to_string(word).map_err(|e| Failure::Internal(e.to_string()))
 }
 
+/// A script that does one task. A task that is to go on is started again, and one that was killed,
+/// so many times: what has no memory left would be killed for ever.
+fn task(names: &Names, wish: &Wish, number: &str) -> String {
+    let (program, dir) = (quoted(&names.program), quoted(&names.dir));
+    let (tasks, cores) = (names.tasks, wish.cores);
+    format!(
+        r#"#!/bin/sh
+killed=0
+while :; do
+  {program} campaign run {dir} --part "{number}/{tasks}" --threads {cores} --quiet
+  code=$?
+  [ "$code" -gt 128 ] && killed=$((killed + 1))
+  [ "$code" = 75 ] || {{ [ "$code" -gt 128 ] && [ "$killed" -le {KILLS} ]; }} || exit "$code"
+  [ "$code" = 75 ] && sleep 1
+done
+"#
+    )
+}
+
 fn slurm(names: &Names, wish: &Wish) -> JobFiles {
     let (program, dir) = (quoted(&names.program), quoted(&names.dir));
     let last = names.tasks - 1;
@@ -109,7 +131,9 @@ run=$!
 wait "$run"; code=$?
 # A trap ends the first wait; the second one is for the program.
 while kill -0 "$run" 2>/dev/null; do wait "$run"; code=$?; done
-[ "$code" = 75 ] && scontrol requeue "${{SLURM_ARRAY_JOB_ID}}_$SLURM_ARRAY_TASK_ID"
+if [ "$code" = 75 ] || {{ [ "$code" -gt 128 ] && [ "${{SLURM_RESTART_COUNT:-0}}" -le {KILLS} ]; }}; then
+  scontrol requeue "${{SLURM_ARRAY_JOB_ID}}_$SLURM_ARRAY_TASK_ID"
+fi
 exit "$code"
 "#
     );
@@ -129,29 +153,29 @@ exit "$code"
 fn hyperqueue(names: &Names, wish: &Wish) -> JobFiles {
     let (program, dir) = (quoted(&names.program), quoted(&names.dir));
     let (tasks, cores) = (names.tasks, wish.cores);
-    // HyperQueue starts a task again whose worker was lost, and none that ended by itself: the
-    // script does that for 75.
-    let task = format!(
-        "#!/bin/sh\ncode=75\nwhile [ \"$code\" = 75 ]; do\n  {program} campaign run {dir} --part \"$HQ_TASK_ID/{tasks}\" --threads {cores} --quiet\n  code=$?\n  [ \"$code\" = 75 ] && sleep 1\ndone\nexit \"$code\"\n"
-    );
     let mut job = format!("name = \"intrados\"\nmax_fails = {tasks}\n");
     for id in 0..tasks {
+        // Lost workers are no fault of the task.
         _ = write!(
             job,
-            "\n[[task]]\nid = {id}\ncommand = [\"sh\", \"task.sh\"]\ncrash_limit = \"unlimited\"\n[[task.request]]\nresources = {{ \"cpus\" = \"{cores}\" }}\n"
+            "\n[[task]]\nid = {id}\ncommand = [\"sh\", \"task.sh\"]\ncrash_limit = 1000\n[[task.request]]\nresources = {{ \"cpus\" = \"{cores}\" }}\n"
         );
     }
     let submit = format!(
         "#!/bin/sh\nset -e\ncd {dir}/launch/hyperqueue\nhq job submit-file job.toml\n# Once it is done (hq job wait last): {program} campaign collect {dir}\n"
     );
+    let task = task(names, wish, "$HQ_TASK_ID");
     JobFiles {
         folder: "hyperqueue",
         files: vec![("task.sh", task), ("job.toml", job), ("submit.sh", submit)],
     }
 }
 
-fn kubernetes(names: &Names, wish: &Wish) -> Result<JobFiles, Failure> {
+fn kubernetes(names: &Names, wish: &Wish, plan: &Plan) -> Result<JobFiles, Failure> {
     let (dir, image, claim) = (string(&names.dir)?, string(&wish.image)?, string(&wish.claim)?);
+    let mount = string(&text(common(&names.dir, plan)?)?)?;
+    // A name of its own for every plan, so that the same one is not begun twice.
+    let name: String = plan.units.first().map_or("", |u| &u.id).chars().take(10).collect();
     let (tasks, cores) = (names.tasks, wish.cores);
     let parallel = tasks.min(1000);
     // 75 is no failure: it is started again. What is wrong with the input stays wrong.
@@ -159,7 +183,7 @@ fn kubernetes(names: &Names, wish: &Wish) -> Result<JobFiles, Failure> {
         r#"apiVersion: batch/v1
 kind: Job
 metadata:
-  generateName: intrados-
+  name: intrados-{name}
 spec:
   completionMode: Indexed
   completions: {tasks}
@@ -201,7 +225,7 @@ spec:
               memory: 1Gi
           volumeMounts:
             - name: campaign
-              mountPath: {dir}
+              mountPath: {mount}
       volumes:
         - name: campaign
           persistentVolumeClaim:
@@ -209,18 +233,37 @@ spec:
 "#
     );
     let submit = format!(
-        "#!/bin/sh\nset -e\ncd {}/launch/kubernetes\nkubectl create -f job.yaml\n",
+        "#!/bin/sh\nset -e\ncd {}/launch/kubernetes\nkubectl apply -f job.yaml\n",
         quoted(&names.dir)
     );
     Ok(JobFiles { folder: "kubernetes", files: vec![("job.yaml", job), ("submit.sh", submit)] })
 }
 
+/// The deepest folder that holds the campaign and the files of its structures.
+fn common(dir: &str, plan: &Plan) -> Result<PathBuf, Failure> {
+    let files = plan.structures.iter().map(|s| s.path.as_path()).filter(|p| p.is_absolute());
+    let mut common = PathBuf::from(dir);
+    for file in files {
+        while !file.starts_with(&common) {
+            common.pop();
+        }
+    }
+    if common.parent().is_none() {
+        return Err(Failure::Usage(
+            "the campaign and its structures share no folder that could be mounted: put them into one"
+                .into(),
+        ));
+    }
+    Ok(common)
+}
+
 fn local(names: &Names, wish: &Wish, processes: u16) -> JobFiles {
     let (program, dir) = (quoted(&names.program), quoted(&names.dir));
-    let (last, tasks, cores) = (names.tasks - 1, names.tasks, wish.cores);
-    // xargs goes on after failures and says 123 at the end; units that failed are in `status`.
+    let last = names.tasks - 1;
+    // xargs goes on after failures; units that failed are in `status`, and collecting names them.
     let submit = format!(
-        "#!/bin/sh\nseq 0 {last} | xargs -P {processes} -I TASK {program} campaign run {dir} --part TASK/{tasks} --threads {cores} --quiet\nexec {program} campaign collect {dir}\n"
+        "#!/bin/sh\ncd {dir}/launch/local || exit\nseq 0 {last} | xargs -P {processes} -n 1 sh task.sh\nexec {program} campaign collect {dir}\n"
     );
-    JobFiles { folder: "local", files: vec![("submit.sh", submit)] }
+    let task = task(names, wish, "$1");
+    JobFiles { folder: "local", files: vec![("task.sh", task), ("submit.sh", submit)] }
 }

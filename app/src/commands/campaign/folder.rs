@@ -3,6 +3,7 @@
 //!
 //! ```text
 //! campaign.json            the plan
+//! guides/K.guide           what steers the walks of structure K, learnt once
 //! work/ID/                 a unit at work, or broken off; locked while somebody works
 //! units/ID/unit.json …     a unit that is done: moved here by one rename
 //! units/ID~DIGEST/         another result of the same unit, which should not be
@@ -79,25 +80,33 @@ impl Folder {
         &self.0
     }
 
-    /// Writes the plan. The same plan may be made again; another one is refused.
-    pub(crate) fn begin(&self, plan: &Plan) -> Result<(), Failure> {
+    /// Whether the plan may be written here: the same one may be there, another one not.
+    pub(crate) fn may_begin(&self, plan: &Plan) -> Result<(), Failure> {
         let place = self.0.join(PLAN);
-        if place.exists() {
-            if Plan::read(&place).is_ok_and(|there| there == *plan) {
-                return Ok(());
-            }
-            return Err(Failure::cannot_write(
-                &place,
-                "another campaign is there: name a new folder, or remove that one",
-            ));
+        if !place.exists() || Plan::read(&place).is_ok_and(|there| there == *plan) {
+            return Ok(());
         }
+        Err(Failure::cannot_write(
+            &place,
+            "another campaign is there: name a new folder, or remove that one",
+        ))
+    }
+
+    /// Writes the plan.
+    pub(crate) fn begin(&self, plan: &Plan) -> Result<(), Failure> {
+        self.may_begin(plan)?;
         output::folder(&self.0)?;
-        output::put(&place, output::json(plan)?.as_bytes())
+        output::put(&self.0.join(PLAN), output::json(plan)?.as_bytes())
     }
 
     /// The plan.
     pub(crate) fn plan(&self) -> Result<Plan, Failure> {
         Plan::read(&self.0.join(PLAN))
+    }
+
+    /// What steers the walks of a structure, where it was learnt.
+    pub(super) fn guide(&self, structure: usize) -> PathBuf {
+        self.0.join("guides").join(format!("{structure}.guide"))
     }
 
     pub(super) fn done(&self, id: &str) -> PathBuf {

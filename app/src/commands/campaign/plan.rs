@@ -24,7 +24,7 @@ const MOST: usize = 1_000_000;
 /// Longest plan that is read, bytes.
 const LONGEST: u64 = 1 << 30;
 /// What a campaign says itself, and what would make results depend on a clock.
-const OURS: [&str; 11] = [
+const OURS: [&str; 13] = [
     "--out",
     "--shard",
     "--checkpoint",
@@ -33,6 +33,8 @@ const OURS: [&str; 11] = [
     "--time-limit",
     "--target-rel-error",
     "--replay",
+    "--guide-from",
+    "--learn-only",
     "--format",
     "--threads",
     "--ifc",

@@ -61,7 +61,7 @@ pub(crate) fn run(
     }
     let begin = Instant::now();
     let cpu = cpu_seconds();
-    let worked = catch(|| work(session, plan, unit, &held)).unwrap_or_else(|fault| {
+    let worked = catch(|| work(session, folder, plan, unit, &held)).unwrap_or_else(|fault| {
         Err(Failure::Internal(format!("internal error: please report it: {fault}")))
     });
     let done = worked.and_then(|digest| match digest {
@@ -90,6 +90,7 @@ pub(crate) fn run(
 /// The work itself; its digest, or none where it was stopped.
 fn work(
     session: &Session,
+    folder: &Folder,
     plan: &Plan,
     unit: &Unit,
     held: &Held,
@@ -100,7 +101,7 @@ fn work(
         return keep(&held.folder, &rows).map(Some);
     }
     if plan.walks() {
-        return walk(session, plan, unit, held);
+        return walk(session, folder, plan, unit, held);
     }
     let files = held.folder.join(FILES);
     let mut words = plan.words_of(unit)?;
@@ -127,15 +128,38 @@ fn command(session: &Session, words: &[String]) -> Result<Outcome, Failure> {
     commands::run(&cli, &session.within())
 }
 
+/// Learns what steers the walks of every structure, once for all of its units.
+pub(crate) fn learn(session: &Session, folder: &Folder, plan: &Plan) -> Result<(), Failure> {
+    for structure in 0..if plan.walks() { plan.structures.len() } else { 0 } {
+        let Some(unit) = plan.units.iter().find(|unit| unit.structure == structure) else {
+            continue;
+        };
+        let guide = folder.guide(structure);
+        output::folder(guide.parent().unwrap_or(folder.path()))?;
+        let mut words = plan.words_of(unit)?;
+        let scratch = tempfile::tempdir()
+            .map_err(|e| Failure::Internal(format!("a temporary folder: {e}")))?;
+        words.extend(["--out".to_owned(), text(scratch.path())?, "--learn-only".to_owned()]);
+        words.extend(["--guide-from".to_owned(), text(&guide)?]);
+        command(session, &words)?;
+    }
+    Ok(())
+}
+
 /// Walks, whose checkpoint is their result.
 fn walk(
     session: &Session,
+    folder: &Folder,
     plan: &Plan,
     unit: &Unit,
     held: &Held,
 ) -> Result<Option<String>, Failure> {
     let (files, state) = (held.folder.join(FILES), held.folder.join(WALKS));
+    let guide = folder.guide(unit.structure);
     let mut words = plan.words_of(unit)?;
+    if guide.is_file() {
+        words.extend(["--guide-from".to_owned(), text(&guide)?]);
+    }
     words.extend(["--out".to_owned(), text(&files)?, "--checkpoint".to_owned(), text(&state)?]);
     if state.is_file() {
         words.extend(["--resume".to_owned(), text(&state)?]);
