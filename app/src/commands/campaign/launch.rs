@@ -195,6 +195,7 @@ spec:
       - action: Ignore
         onPodConditions:
           - type: DisruptionTarget
+            status: "True"
       - action: Ignore
         onExitCodes:
           containerName: intrados

@@ -101,7 +101,7 @@ impl Sections {
         // both are everywhere: the worse counts.
         let is_above = |zone: usize| match span.kind {
             Kind::Deck => above.0[0].damage > below.0[0].damage,
-            _ => span.continuous && (zone < 2 || zone >= ZONES - 2),
+            _ => span.continuous && !(2..ZONES - 2).contains(&zone),
         };
         let told = |then: usize| {
             std::array::from_fn(|zone| if is_above(zone) { above.0[then] } else { below.0[then] })
