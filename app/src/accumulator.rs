@@ -1,28 +1,24 @@
-//! The state of work in a file: checkpoints, and the shards that `merge` adds up.
-//!
-//! `INTRADOS`, format (u32), length of the content (u64), BLAKE3 of the content, content
-//! (postcard); integers little-endian. Floats are stored bit by bit, so that work that is resumed
-//! has the same bits as work that was never interrupted.
+//! The state of work in a file: checkpoints, and the shards that `merge` adds up. Floats are stored
+//! bit by bit, so that work that is resumed has the same bits as work that was never interrupted.
 
 use std::{
     collections::BTreeSet,
-    io::Read,
     path::{Path, PathBuf},
 };
 
 use intrados_light::{Exposure, Plate, Sensor};
-use intrados_stage::access;
 use serde::{Deserialize, Serialize};
 
-use crate::{failure::Failure, output};
+use crate::{failure::Failure, sealed};
 
-const MAGIC: &[u8; 8] = b"INTRADOS";
-/// Raise it whenever anything that is stored changes.
-const FORMAT: u32 = 4;
-const HEADER: usize = 8 + 4 + 8 + 32;
-/// Longest content that is read, bytes: a picture of 64 megapixels from both sides has 20 GB less
-/// than this.
-const MAX_BYTES: u64 = 40 << 30;
+/// Raise its number whenever anything that is stored changes. A picture of 64 megapixels from both
+/// sides has 20 GB less than the most.
+const MARK: sealed::Mark = sealed::Mark {
+    magic: *b"INTRADOS",
+    format: 4,
+    most: 40 << 30,
+    stranger: "is no accumulator of Intrados: name a file that --shard or --checkpoint wrote",
+};
 
 /// Work of one scene.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -108,6 +104,11 @@ impl Accumulator {
         }
     }
 
+    /// Whether every walk of its parts was walked.
+    pub(crate) fn is_whole(&self) -> bool {
+        self.exposures().flat_map(Exposure::unfinished).next().is_none()
+    }
+
     fn exposures(&self) -> impl Iterator<Item = &Exposure> {
         let (picture, readings) = match &self.content {
             Content::Picture { plate, .. } => (Some(plate.exposures().iter().flatten()), None),
@@ -126,54 +127,33 @@ impl Accumulator {
     }
 
     pub(crate) fn write(&self, path: &Path) -> Result<(), Failure> {
-        let mut bytes = vec![0; HEADER];
-        bytes = postcard::to_extend(self, bytes)
-            .map_err(|e| Failure::Internal(format!("cannot store the work: {e}")))?;
-        let (header, content) = bytes.split_at_mut(HEADER);
-        let sum = blake3::hash(content);
-        let fields: [&[u8]; 4] =
-            [MAGIC, &FORMAT.to_le_bytes(), &(content.len() as u64).to_le_bytes(), sum.as_bytes()];
-        header.copy_from_slice(&fields.concat());
-        output::put(path, &bytes)
+        sealed::write(path, MARK, self)
     }
 
     pub(crate) fn read(path: &Path) -> Result<Self, Failure> {
-        let bad = |why: String| Failure::BadInput(format!("{}: {why}", path.display()));
-        let (mut file, length) = access::open(path).map_err(|e| Failure::denied(path, &e))?;
-        let mut header = Vec::with_capacity(HEADER);
-        (&mut file)
-            .take(HEADER as u64)
-            .read_to_end(&mut header)
-            .map_err(|e| Failure::no_input(path, &e))?;
-        let expected = check_header(&header).map_err(bad)?;
-        if length != HEADER as u64 + expected {
-            return Err(bad(format!(
-                "has {length} bytes where its header says {}: it was cut or added to",
-                HEADER as u64 + expected
-            )));
-        }
-        let mut content = Vec::new();
-        file.take(expected).read_to_end(&mut content).map_err(|e| Failure::no_input(path, &e))?;
-        if header.get(20..) != Some(blake3::hash(&content).as_bytes()) {
-            return Err(bad("is damaged: its checksum does not agree".into()));
-        }
-        // The version comes first, so that it can be read whatever the rest has become.
-        let ours = env!("CARGO_PKG_VERSION");
-        match postcard::take_from_bytes::<String>(&content) {
-            Ok((theirs, _)) if theirs != ours => {
-                return Err(bad(format!(
-                    "was made by version {theirs}, and this is {ours}: make it again with this version"
-                )));
-            }
-            _ => {}
-        }
-        let accumulator: Self = postcard::from_bytes(&content)
-            .map_err(|_| bad("is damaged: its content cannot be read".into()))?;
+        let accumulator: Self = sealed::read(path, MARK)?;
         if accumulator.is_consistent() {
             Ok(accumulator)
         } else {
-            Err(bad("is damaged: its parts do not fit together".into()))
+            Err(Failure::BadInput(format!(
+                "{}: is damaged: its parts do not fit together",
+                path.display()
+            )))
         }
+    }
+
+    /// A hash of all that is the same in every run: everything but CPU-seconds.
+    pub(crate) fn digest(mut self) -> Result<String, Failure> {
+        match &mut self.content {
+            Content::Picture { plate, .. } => plate.forget_clock(),
+            Content::Readings { primal, dual, training, .. } => {
+                *training = 0.0;
+                primal.iter_mut().chain(dual).for_each(|e| e.cpu_seconds = 0.0);
+            }
+        }
+        let bytes = postcard::to_stdvec(&self)
+            .map_err(|e| Failure::Internal(format!("cannot store the work: {e}")))?;
+        Ok(blake3::hash(&bytes).to_hex().to_string())
     }
 
     fn is_consistent(&self) -> bool {
@@ -212,7 +192,7 @@ impl Accumulator {
     }
 
     /// Adds the walks of another one of the same work.
-    fn merge(&mut self, other: &Self) -> Result<(), String> {
+    pub(crate) fn merge(&mut self, other: &Self) -> Result<(), String> {
         if self.scene_hash != other.scene_hash {
             return Err(format!(
                 "it is of another scene ({} {})",
@@ -256,30 +236,6 @@ fn short(hash: &str) -> &str {
     hash.get(..12).unwrap_or(hash)
 }
 
-/// Length of the content.
-fn check_header(header: &[u8]) -> Result<u64, String> {
-    let number = |at: std::ops::Range<usize>| {
-        header.get(at).map(|b| b.iter().rev().fold(0_u64, |n, &byte| n << 8 | u64::from(byte)))
-    };
-    if header.get(..8) != Some(MAGIC) {
-        return Err(
-            "is no accumulator of Intrados: name a file that --shard or --checkpoint wrote".into(),
-        );
-    }
-    let (Some(format), Some(length), HEADER) = (number(8..12), number(12..20), header.len()) else {
-        return Err("is cut within its header".into());
-    };
-    if format != u64::from(FORMAT) {
-        return Err(format!(
-            "has format {format}, and this version reads {FORMAT}: make it again with this version"
-        ));
-    }
-    if length > MAX_BYTES {
-        return Err(format!("says that it has {length} bytes of content, more than any work has"));
-    }
-    Ok(length)
-}
-
 /// Reads accumulators and adds them up, in the order of their shards, so that the order of the
 /// files changes no bit.
 pub(crate) fn merge(files: &[PathBuf]) -> Result<Accumulator, Failure> {
@@ -307,6 +263,7 @@ pub(crate) fn merge(files: &[PathBuf]) -> Result<Accumulator, Failure> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sealed::HEADER;
     use intrados_light::{LitScene, Render, RenderSettings};
     use std::sync::Arc;
 

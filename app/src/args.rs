@@ -33,7 +33,7 @@ A SCENE is a .ron scene, a .glb or .gltf model, or the name of a scene that come
 stdout carries data only; messages and progress go to stderr.
 
 Exit codes: 0 done, 1 internal error or a failed check, 2 wrong usage, 3 target error not reached, 65 bad input, 66 no input,
-73 cannot write, 130 interrupted.
+73 cannot write, 75 a unit of a campaign that is to be started again, 130 interrupted.
 
 Interrupted by Ctrl-C or SIGTERM, render and measure write what they have reached and mark it; predict, scan, analyze and experiment table-3-1
 (with --out) keep their finished parts in that folder, killed ones too, and the same command goes on from them. A second signal ends at once.
@@ -44,7 +44,7 @@ Examples:
   intrados measure room --target-rel-error 0.002  readings from both sides
   intrados predict column --out report            damage per member";
 
-#[derive(Debug, Args)]
+#[derive(Debug, Default, Args)]
 pub(crate) struct Common {
     /// How results are printed
     #[arg(
@@ -166,6 +166,12 @@ pub(crate) enum Command {
         after_help = "Example:\n  intrados render column --spp 4096 --shard 0/2 --out parts   (and 1/2 elsewhere)\n  intrados merge parts/*.acc --out whole"
     )]
     Merge(Merge),
+    /// Splits work over many structures, or long work on one, into units that any scheduler can run
+    #[command(
+        subcommand_required = true,
+        after_help = "Example:\n  intrados campaign new door64 --command measure --over door --split 64 -- --spp 65536\n  intrados campaign launch door64 --local 2 --submit\n  intrados campaign status door64\n  intrados campaign collect door64\n\nA unit that is done is never done again; one that was stopped (SIGTERM, exit code 75) or killed goes on from its checkpoint when it is started again. The folder is all that workers share. What is collected has the same bits for any number of units and workers and any order."
+    )]
+    Campaign(Campaign),
 }
 
 #[derive(Debug, Args, Default)]
@@ -662,6 +668,13 @@ pub(crate) struct Light {
     /// never. Learning takes at most half of what --spp and --time-limit allow
     #[arg(long, value_enum, default_value = "auto")]
     pub(crate) guide: GuideArg,
+    /// What steers the walks from a file, instead of learning it; learnt and written there if there
+    /// is none. Campaigns share it so
+    #[arg(long, value_name = "FILE")]
+    pub(crate) guide_from: Option<PathBuf>,
+    /// Learn what steers the walks into that file, and end
+    #[arg(long, hide = true, requires = "guide_from")]
+    pub(crate) learn_only: bool,
     /// Seed of all random numbers
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub(crate) seed: u64,
@@ -1171,6 +1184,158 @@ fn case_range(text: &str) -> Result<CaseRange, String> {
         [Some(from), Some(to)] if 1 <= from && from <= to && to <= 20 => Ok(CaseRange([from, to])),
         _ => Err("write a case from 1 to 20, or the first and the last, such as 1..20".into()),
     }
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Campaign {
+    #[command(subcommand)]
+    pub(crate) step: CampaignStep,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum CampaignStep {
+    /// Plans the units of work and writes them into a new folder
+    #[command(
+        after_help = "Examples:\n  intrados campaign new hall --command predict --over column.ron beam.ron bridge/ -- --ahead 30\n  intrados campaign new door64 --command measure --over door --split 64 -- --spp 65536 --seed 7\n  intrados campaign new roads --command predict --over bridges.csv --split 64\n\nA table of bridges (.csv) becomes spans by stated rules (docs/network.md of this project), each with a life of its decisive section, or with --life full in finite elements. The rest of the command line, after --, goes to the command as it is; --out, --shard, --checkpoint, --resume and stop rules by clock are the campaign's own."
+    )]
+    New(CampaignNew),
+    /// Does units: those named, a part of all, or all one after the other
+    #[command(
+        after_help = "Exit codes: 0 all of them are done (now or before), 75 to be started again: a signal, or another worker has one; else that of the first failure, which `status` lists. Other units go on."
+    )]
+    Run(CampaignRun),
+    /// How far a campaign is, what failed and why, and how long it will take
+    Status(CampaignFolder),
+    /// Adds up what is done, in the order of the plan: CSV, JSON, Parquet, and of predictions a page
+    #[command(
+        after_help = "Fails with 65 and names the units where some are missing (unless --partial) or where two results of one unit differ."
+    )]
+    Collect(CampaignCollect),
+    /// Writes and shows the job files of a scheduler, and hands them to it if asked
+    #[command(
+        group(clap::ArgGroup::new("engine").required(true)),
+        after_help = "Examples:\n  intrados campaign launch door64 --slurm --submit\n  intrados campaign launch door64 --kubernetes --image registry/intrados:0.1.0 --claim data | kubectl apply -f -"
+    )]
+    Launch(CampaignLaunch),
+}
+
+/// What a campaign may run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(crate) enum Job {
+    Predict,
+    Measure,
+    Render,
+    Scan,
+    Analyze,
+}
+
+/// How a span of a table lives.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(crate) enum LifeArg {
+    /// Its decisive section: milliseconds
+    #[default]
+    Section,
+    /// Finite elements: seconds to minutes
+    Full,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct CampaignNew {
+    /// Folder to make
+    pub(crate) dir: PathBuf,
+    /// What is done in every unit
+    #[arg(long, value_enum)]
+    pub(crate) command: Job,
+    /// Scenes, project folders, models, names of bundled scenes; or one table of bridges (.csv)
+    #[arg(long, required = true, num_args = 1.., value_name = "STRUCTURE")]
+    pub(crate) over: Vec<PathBuf>,
+    /// Units per structure (measure, render: parts of the walks), or of a table
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = value_parser!(u64).range(1..=1 << 16))]
+    pub(crate) split: u64,
+    /// A unit for every member (scan, analyze)
+    #[arg(long)]
+    pub(crate) each_member: bool,
+    /// How spans of a table live
+    #[arg(long, value_enum, default_value_t)]
+    pub(crate) life: LifeArg,
+    /// The year that is now, for a table
+    #[arg(long, value_name = "YEAR", default_value_t = 2026, value_parser = value_parser!(i32).range(1900..=2200))]
+    pub(crate) now: i32,
+    /// Years from now on that a table's forecast reaches
+    #[arg(long, value_name = "YEARS", default_value_t = 20.0, value_parser = years)]
+    pub(crate) ahead: f64,
+    /// Only the first rows of a table
+    #[arg(long, value_name = "N")]
+    pub(crate) first: Option<usize>,
+    /// What goes to the command as it is, after --
+    #[arg(last = true, value_name = "ARGS")]
+    pub(crate) rest: Vec<String>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct CampaignFolder {
+    /// The campaign's folder
+    pub(crate) dir: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct CampaignRun {
+    /// The campaign's folder
+    pub(crate) dir: PathBuf,
+    /// Number of a unit, from 0; may be given several times
+    #[arg(long, value_name = "K", conflicts_with = "part")]
+    pub(crate) unit: Vec<usize>,
+    /// Every N-th unit, from the I-th on
+    #[arg(long, value_name = "I/N", value_parser = shard)]
+    pub(crate) part: Option<Shard>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct CampaignCollect {
+    /// The campaign's folder
+    pub(crate) dir: PathBuf,
+    /// Folder for what is collected; `collected` in the campaign's if absent
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+    /// Take what there is, and say what is missing
+    #[arg(long)]
+    pub(crate) partial: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct CampaignLaunch {
+    /// The campaign's folder
+    pub(crate) dir: PathBuf,
+    /// An array of Slurm, and a job that collects after it
+    #[arg(long, group = "engine")]
+    pub(crate) slurm: bool,
+    /// A job file of HyperQueue
+    #[arg(long, group = "engine")]
+    pub(crate) hyperqueue: bool,
+    /// An Indexed Job of Kubernetes
+    #[arg(long, group = "engine")]
+    pub(crate) kubernetes: bool,
+    /// So many processes of this machine
+    #[arg(long, group = "engine", value_name = "N", value_parser = value_parser!(u16).range(1..=1024))]
+    pub(crate) local: Option<u16>,
+    /// Tasks that the units are dealt to; one for each, at most 1000, if absent
+    #[arg(long, value_name = "N", value_parser = value_parser!(u64).range(1..=100_000))]
+    pub(crate) tasks: Option<u64>,
+    /// Cores of a task
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = value_parser!(u16).range(1..=1024))]
+    pub(crate) cores: u16,
+    /// Container with this program (Kubernetes)
+    #[arg(long, value_name = "IMAGE", default_value = concat!("intrados:", env!("CARGO_PKG_VERSION")))]
+    pub(crate) image: String,
+    /// Persistent volume claim that holds the campaign's folder and the structures, under the same
+    /// paths (Kubernetes)
+    #[arg(long, value_name = "NAME", default_value = "intrados")]
+    pub(crate) claim: String,
+    /// Hand it to the scheduler: sbatch, hq, kubectl, or sh
+    #[arg(long)]
+    pub(crate) submit: bool,
 }
 
 #[derive(Debug, Args)]

@@ -40,6 +40,8 @@ pub(crate) enum Outcome {
     Missing,
     /// Stopped by a signal; what there was is written.
     Interrupted,
+    /// A unit of a campaign that goes on when it is started again.
+    ToBeContinued,
 }
 
 impl Failure {
@@ -86,6 +88,8 @@ impl Outcome {
             Self::Faulty => 65,
             Self::Missing => 66,
             Self::Interrupted => 130,
+            // EX_TEMPFAIL of sysexits.h: schedulers know it as "try again".
+            Self::ToBeContinued => 75,
         }
     }
 }

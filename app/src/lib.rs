@@ -30,6 +30,7 @@ mod output;
 mod picture;
 mod processor;
 mod progress;
+mod sealed;
 mod session;
 
 use std::{process::ExitCode, sync::Arc};

@@ -20,6 +20,9 @@ impl Session {
         result: &impl Serialize,
         table: impl FnOnce() -> String,
     ) -> Result<(), Failure> {
+        if !self.prints() {
+            return Ok(());
+        }
         match self.format {
             Format::Table => say(&table()),
             Format::Json => say(&json(result)?),

@@ -28,9 +28,28 @@ pub(crate) struct Session {
     /// Makes the app that predicts or that the window shows.
     pub(crate) build: Build,
     quiet: bool,
+    /// Whether results are kept off stdout: another command runs this one and reads its files.
+    mute: bool,
 }
 
 impl Session {
+    /// The same for a command that another one runs: it prints nothing.
+    pub(crate) fn within(&self) -> Self {
+        Self {
+            format: self.format,
+            job: self.job.clone(),
+            access: self.access.clone(),
+            build: Build::clone(&self.build),
+            quiet: true,
+            mute: true,
+        }
+    }
+
+    /// Whether results go to stdout.
+    pub(crate) fn prints(&self) -> bool {
+        !self.mute
+    }
+
     /// A line for the user on stderr, unless it is to be quiet.
     pub(crate) fn note(&self, line: impl Display) {
         if !self.quiet {
@@ -63,6 +82,7 @@ pub(crate) fn run(
         access: Access::new(common.allow.clone()),
         build,
         quiet: common.quiet,
+        mute: false,
     };
     let result = catch_unwind(AssertUnwindSafe(|| {
         start_threads(common)?;

@@ -31,11 +31,16 @@ fn all() -> String {
         "experiment",
         "verify",
         "merge",
+        "campaign",
+        "campaign new",
+        "campaign run",
+        "campaign status",
+        "campaign collect",
+        "campaign launch",
     ];
     let mut all = String::new();
     for command in commands {
-        let args: Vec<&str> =
-            [command, "--help"].into_iter().filter(|word| !word.is_empty()).collect();
+        let args: Vec<&str> = command.split_whitespace().chain(["--help"]).collect();
         let said = run(&args);
         assert!(said.status.success(), "{command}");
         let lines: Vec<String> = String::from_utf8(said.stdout)

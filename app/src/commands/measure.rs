@@ -37,7 +37,7 @@ pub(crate) struct Report {
     target_reached: Option<bool>,
     /// When an error bar counts as converged.
     thresholds: Thresholds,
-    meters: Vec<MeterReading>,
+    pub(crate) meters: Vec<MeterReading>,
     /// Where the variance of steered walks comes from, worst first; only if asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     explain: Option<Vec<Culprit>>,
@@ -172,8 +172,15 @@ pub(crate) fn run(session: &Session, args: &args::Measure) -> Result<Outcome, Fa
         must_reach: false,
     };
     let rules = Rules::new(&args.stop, default);
-    let guide =
-        walks::guide(session, &opened.lit, &sensors, rule, &args.light, &rules)?.map(Arc::new);
+    let mut guide = walks::guide(session, &opened.lit, &sensors, rule, &args.light, &rules)?;
+    if args.light.learn_only {
+        return Ok(Outcome::Done);
+    }
+    // A guide that shards share was learnt once and is charged once.
+    if args.light.guide_from.is_some() && shard.index > 0 {
+        guide.iter_mut().for_each(|guide| guide.cpu_seconds = 0.0);
+    }
+    let guide = guide.map(Arc::new);
     let measurement = Measurement::new(
         opened.lit.clone(),
         sensors,

@@ -2,6 +2,7 @@
 
 mod analyze;
 mod attach;
+mod campaign;
 mod detach;
 mod detect;
 mod experiment;
@@ -49,5 +50,6 @@ pub(crate) fn run(cli: &Cli, session: &Session) -> Result<Outcome, Failure> {
         Some(Command::Experiment(args)) => experiment::run(session, args),
         Some(Command::Verify) => verify::run(session),
         Some(Command::Merge(args)) => merge::run(session, args),
+        Some(Command::Campaign(args)) => campaign::run(session, args),
     }
 }

@@ -62,7 +62,7 @@ pub(crate) struct Report {
     target_rel_error: Option<f64>,
     target_reached: Option<bool>,
     shards: Shards,
-    files: Vec<String>,
+    pub(crate) files: Vec<String>,
 }
 
 /// A picture in progress, and where its state goes.
@@ -156,6 +156,9 @@ pub(crate) fn run(session: &Session, args: &args::Render) -> Result<Outcome, Fai
     } else {
         None
     };
+    if args.light.learn_only {
+        return Ok(Outcome::Done);
+    }
     let mut work = Picture {
         render: Render::guided(opened.lit.clone(), &camera, &settings, guide.as_ref()),
         scene: &opened.scene,

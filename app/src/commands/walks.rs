@@ -12,6 +12,7 @@ use crate::{
     args::{Keep, Light, Size},
     drive::Rules,
     failure::Failure,
+    sealed,
     session::Session,
 };
 
@@ -104,8 +105,15 @@ pub(crate) fn guide(
         tracing::info!("not steered: what may be spent is too little to learn from");
         return Ok(None);
     };
+    let key = format!("{:?}", (&lit.scene.hash, sensors, rule, light.seed, steering, effort));
+    if let Some(path) = light.guide_from.as_deref().filter(|path| path.exists()) {
+        return shared(path, &key, lit, sensors).map(Some);
+    }
     let _progress = session.watch(format!("learning what steers the walks of {}", lit.scene.name));
     let guide = learn(lit, sensors, rule, light.seed, steering, effort, &session.job)?;
+    if let Some(path) = &light.guide_from {
+        sealed::write(path, GUIDE, &(env!("CARGO_PKG_VERSION"), &key, &guide))?;
+    }
     let steered: Vec<&str> = Side::BOTH
         .into_iter()
         .filter(|&s| guide.steers(s))
@@ -122,6 +130,29 @@ pub(crate) fn guide(
         guide.bytes() as f64 / 1e3
     );
     Ok(Some(guide))
+}
+
+/// Marks the file of a guide; raise its number whenever anything that is stored changes.
+const GUIDE: sealed::Mark = sealed::Mark {
+    magic: *b"INTRAGUI",
+    format: 1,
+    most: 4 << 30,
+    stranger: "is no guide of walks: name a file that --guide-from wrote",
+};
+
+/// A guide that somebody has learnt, for the same walks.
+fn shared(path: &Path, key: &str, lit: &LitScene, sensors: &[Sensor]) -> Result<Guide, Failure> {
+    let (_, theirs, guide): (String, String, Guide) = sealed::read(path, GUIDE)?;
+    let other = || {
+        Failure::BadInput(format!(
+            "{}: was learnt for another scene or other options: remove it, or name another file",
+            path.display()
+        ))
+    };
+    if theirs != key {
+        return Err(other());
+    }
+    guide.back(lit, sensors).ok_or_else(other)
 }
 
 /// Events that one second of a time limit stands for, by decision: learning must depend on no

@@ -2,6 +2,7 @@
 
 mod course;
 mod life;
+pub mod span;
 mod width;
 
 pub use course::GaugeCourse;

@@ -678,10 +678,10 @@ fn cover(body: &Body) -> Option<f64> {
 
 /// What an assumed class adds to the relative error of cracking and crushing: strengths of
 /// neighbouring classes differ by a quarter (EN 206), and whoever assumes may be off by one or two.
-const CONCRETE_ASSUMED: f64 = 0.4;
+pub(crate) const CONCRETE_ASSUMED: f64 = 0.4;
 /// What assumed reinforcement adds: cracks' widths go with the inverse of its area (EN 1992-1-1,
 /// 7.3.4), and members have one to two times the least that a code allows.
-const STEEL_ASSUMED: f64 = 0.6;
+pub(crate) const STEEL_ASSUMED: f64 = 0.6;
 
 /// The relative error that assumptions about an assembly add to a forecast.
 fn assumed_error(assembly: &Assembly) -> f64 {

@@ -388,6 +388,12 @@ impl Plate {
         &self.exposures
     }
 
+    /// Takes out what differs from run to run: CPU-seconds.
+    pub fn forget_clock(&mut self) {
+        self.pilot_cpu_seconds = 0.0;
+        self.exposures.iter_mut().flatten().for_each(|e| e.cpu_seconds = 0.0);
+    }
+
     /// The state of one side.
     #[must_use]
     pub fn exposure(&self, side: Side) -> Option<&Exposure> {

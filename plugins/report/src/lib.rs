@@ -6,6 +6,7 @@ mod document;
 mod html;
 mod ifc;
 mod model;
+pub mod network;
 mod record;
 pub mod surface;
 mod svg;

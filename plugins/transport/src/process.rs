@@ -61,7 +61,7 @@ const BETTER: f64 = 1.5;
 const TURNS: f64 = 64.0;
 
 /// One side in one round of learning.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Round {
     /// Which walks.
     pub side: Side,
@@ -125,7 +125,7 @@ pub trait Process {
 }
 
 /// What became of an alternation.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct Course {
     /// What each round was like, in their order.
     pub rounds: Vec<Round>,
@@ -221,7 +221,7 @@ impl Course {
 
 /// How well a field foretells what one step brings: x = what came/what was promised has mean 1 if
 /// the field is right.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Residual {
     /// Steps.
     pub n: u64,

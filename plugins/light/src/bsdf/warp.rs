@@ -4,12 +4,13 @@
 use std::f32::consts::{FRAC_1_PI, FRAC_PI_4, PI};
 
 use glam::{Vec2, Vec3};
+use serde::{Deserialize, Serialize};
 
 /// The largest f32 below 1.
 const BELOW_ONE: f32 = 1.0 - f32::EPSILON / 2.0;
 
 /// An orthonormal frame whose z axis is a given normal.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Frame {
     /// First tangent.
     pub x: Vec3,
@@ -127,7 +128,7 @@ pub fn triangle(u: [f32; 2]) -> [f32; 2] {
 }
 
 /// A choice among finitely many things with fixed probabilities.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Discrete {
     /// `cdf[i]` is the probability of all before i; one longer than the choices, the last entry 1.
     cdf: Vec<f32>,

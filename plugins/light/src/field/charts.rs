@@ -9,7 +9,7 @@ use crate::LitScene;
 const COSINE: f32 = 0.766;
 
 /// Which chart each triangle belongs to.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Charts {
     /// By triangle.
     of: Vec<u32>,

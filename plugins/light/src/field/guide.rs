@@ -3,14 +3,16 @@
 use std::{collections::BTreeMap, sync::Arc};
 
 use intrados_transport::{Course, Residual, Round, Scores, Side};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::{Charts, LightField, steer::SteeredLight};
 use crate::{LightProblem, LitScene, Sensor, bsdf::warp::Discrete};
 
 /// Both fields of one scene and its sensors, ready to steer.
-#[derive(Debug)]
+#[derive(Debug, Serialize, Deserialize)]
 pub struct Guide {
+    /// Follow from the scene: see [`Guide::back`].
+    #[serde(skip)]
     pub(crate) charts: Arc<Charts>,
     /// By side: radiance steers the primal walk, importance the dual.
     pub(crate) fields: [LightField; 2],
@@ -60,6 +62,17 @@ impl Guide {
             fingerprint: 0,
             cpu_seconds: 0.0,
         }
+    }
+
+    /// One that was stored, for the scene and the sensors that it was learnt for; `None` if it is of
+    /// others.
+    #[must_use]
+    pub fn back(mut self, lit: &LitScene, sensors: &[Sensor]) -> Option<Self> {
+        self.charts = Arc::clone(lit.charts());
+        let fits = self.readings.len() == sensors.len() + 1
+            && self.gains.len() == sensors.len()
+            && self.fields.iter().all(|field| field.fits(2 * self.charts.len()));
+        fits.then_some(self)
     }
 
     /// Takes the course of its learning, after which it never changes.

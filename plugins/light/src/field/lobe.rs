@@ -9,6 +9,7 @@
 use std::f32::consts::FRAC_1_PI;
 
 use glam::Vec3;
+use serde::{Deserialize, Serialize};
 use wide::{f32x8, i32x8, u16x8};
 
 use crate::{
@@ -22,7 +23,7 @@ pub(crate) const STEPS: f32 = 65535.0;
 
 /// A partition of a rectangle into 2^depth boxes: halves of equal counts of records, and so on.
 /// Boxes are small where records are dense, and neighbours in number are neighbours in place.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct Boxes {
     depth: u32,
     /// Where node i is cut, and in bit 16 across which axis; its halves are 2i + 1 and 2i + 2.
@@ -154,7 +155,7 @@ impl Plane {
 }
 
 /// Eight pieces of planes: centres, normals, L·A, A/π.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Eight {
     centre: [f32x8; 3],
     normal: [f32x8; 3],
@@ -192,7 +193,7 @@ pub(crate) struct Lobe {
 }
 
 /// A lobe whose cuts and boxes lie with those of all others.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Header {
     /// Of its rectangle.
     corner: Vec3,
@@ -207,7 +208,7 @@ pub(crate) struct Header {
 }
 
 /// Eight boxes of a lobe: corners in steps, L·A.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Eight16 {
     lo: [u16x8; 2],
     hi: [u16x8; 2],
@@ -215,7 +216,7 @@ pub(crate) struct Eight16 {
 }
 
 /// The rectangles of eight lobes of a cell, with what most directions ask of them.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Gates {
     corner: [f32x8; 3],
     normal: [f32x8; 3],
@@ -577,7 +578,7 @@ impl Gates {
 
 /// Directions about a normal where nothing better is known: boxes over the unit square of the
 /// cosine law, each with what arrives from it.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Haze {
     frame: Frame,
     boxes: Boxes,

@@ -16,6 +16,7 @@ mod view;
 
 use glam::Vec3;
 use intrados_transport::Field;
+use serde::{Deserialize, Serialize};
 use wide::f32x8;
 
 use crate::eight::{WIDE, lanes};
@@ -33,7 +34,7 @@ pub use view::false_colours;
 pub(crate) const NONE: u32 = u32::MAX;
 
 /// One side's far field.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct LightField {
     nodes: Vec<Node>,
     /// By key (2 · chart + side; sensors behind them): root, or [`NONE`].
@@ -53,14 +54,14 @@ pub(crate) struct LightField {
 }
 
 /// Splits space, or is a cell.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 enum Node {
     Split { axis: u8, at: f32, left: u32, right: u32 },
     Leaf(u32),
 }
 
 /// What is known of one piece of surface.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Cell {
     /// Lobes: how many, and where their gates begin.
     lobes: u32,
@@ -272,6 +273,11 @@ impl LightField {
     }
 
     /// A number that tells fields apart.
+    /// Whether it has a root for each of so many sides of charts, or is empty.
+    fn fits(&self, sides: usize) -> bool {
+        self.cells.is_empty() || self.roots.len() >= sides
+    }
+
     fn fingerprint(&self) -> u64 {
         let spots = self.packs.iter().flat_map(|pack| pack.fingerprint());
         guide::blake(

@@ -20,7 +20,8 @@ pub(super) const YEARS: f32 = 30.0;
 const BY_YEAR: [(i32, &str); 3] = [(1950, "C12/15"), (1972, "C20/25"), (2001, "C25/30")];
 
 /// The class of a member that was built in that year.
-pub(super) fn concrete(year: Option<i32>) -> &'static str {
+#[must_use]
+pub fn concrete(year: Option<i32>) -> &'static str {
     let Some(year) = year else { return ASSUMED_CONCRETE };
     BY_YEAR.iter().find(|(until, _)| year < *until).map_or(ASSUMED_CONCRETE, |(_, class)| class)
 }

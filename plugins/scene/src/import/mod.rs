@@ -22,6 +22,7 @@ mod project;
 mod shape;
 mod source;
 
+pub use assume::concrete as concrete_of;
 pub use convert::ifcopenshell;
 
 use std::{
