@@ -10,6 +10,7 @@ use bevy_app::App;
 use eframe::egui;
 use intrados_panels::{Action, Actions, Banners, Latest, Window};
 use intrados_scene::plugin::CurrentScene;
+use intrados_stage::Pace;
 
 /// Opens the window for an [`App`] that has the panels and whatever else, with a scene or with the
 /// start screen. The app is built again if a panic has spoilt it (see [`Window`]).
@@ -187,6 +188,9 @@ impl Shooting {
     }
 }
 
+/// Between two frames while only work off the frame goes on.
+const RESTING: Duration = Duration::from_millis(30);
+
 /// A bevy app that eframe drives.
 struct Desktop {
     window: Window,
@@ -201,7 +205,7 @@ impl eframe::App for Desktop {
         self.frames.logic();
         let is_over = match &mut self.shot {
             Some(shot) => {
-                ctx.request_repaint();
+                ctx.request_repaint_after(RESTING);
                 shot.step(&mut self.window)
             }
             None => false,
@@ -209,7 +213,10 @@ impl eframe::App for Desktop {
         if is_over || self.window.app().should_exit().is_some() {
             ctx.send_viewport_cmd(egui::ViewportCommand::Close);
         } else if intrados_panels::is_busy(self.window.world()) {
-            ctx.request_repaint();
+            // Where no picture is refined, nothing moves but bars of progress: the cores are the
+            // work's, above all where a processor paints the window.
+            let rests = *self.window.world().resource::<Pace>() == Pace::Rest;
+            ctx.request_repaint_after(if rests { RESTING } else { Duration::ZERO });
         }
     }
 

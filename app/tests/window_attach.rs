@@ -4,6 +4,7 @@
 #![cfg(feature = "desktop")]
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
+#[allow(dead_code, reason = "other tests need the rest")]
 mod common;
 
 use std::{fs, path::Path};

@@ -319,14 +319,7 @@ fn every_tab_draws() {
     // From the member's sheet to its slices.
     window.click("Member");
     window.click("Its slices");
-    for _ in 0..2_000 {
-        window.frame();
-        if window.harness.query_by_label("CT slice").is_some() {
-            break;
-        }
-        std::thread::sleep(std::time::Duration::from_millis(1));
-    }
-    assert!(window.harness.query_by_label("CT slice").is_some());
+    window.until_seen("CT slice");
     for tab in ["Jobs", "Log", "Convergence", "Render"] {
         window.click(tab);
     }
@@ -356,7 +349,8 @@ fn a_structure_fills_the_window_and_a_member_has_its_sheet_beside_it() {
     window.until("the prediction", |w| w.resource::<Latest>().result.is_some());
     window.frames(2);
     let picture = window.harness.get_by_label("Damage of members").rect();
-    assert!(picture.area() >= 1280.0 * 800.0 * 2.0 / 3.0, "{picture}");
+    // Around it the harness leaves 8 points free on every side.
+    assert!(picture.area() >= (1280.0 - 16.0) * (800.0 - 16.0) * 2.0 / 3.0, "{picture}");
     let (names, result) = window.with(|w| {
         let scene = w.resource::<CurrentScene>().0.clone();
         let names: Vec<String> = scene.members.iter().map(|m| m.name.clone()).collect();
@@ -435,11 +429,11 @@ fn the_palette_does_what_is_typed() {
     assert!(window.harness.query_by_label("Command").is_none(), "it is put away");
     window.harness.key_press_modifiers(egui::Modifiers::COMMAND, Key::K);
     window.frames(3);
-    window.harness.get_by_label("Command").type_text("panel report");
+    window.harness.get_by_label("Command").type_text("panel log");
     window.frames(2);
     window.harness.key_press(Key::Enter);
     window.frames(3);
-    assert!(window.harness.query_by_label_contains("Evidence: ").is_some());
+    assert!(window.harness.query_by_label_contains("opened column").is_some());
 }
 
 /// Types into a field of this name, in place of what was there.
@@ -464,8 +458,7 @@ fn a_finding_is_noted_in_the_form_and_taken_back() {
     window.ask(Action::Select(Some(0)));
     window.frames(2);
     window.click("Attach evidence…");
-    window.frames(2);
-    assert!(window.harness.query_by_label("Fill in its width, mm.").is_some());
+    window.until_seen("Fill in its width, mm.");
     type_into(&mut window, "width, mm", "0.7");
     type_into(&mut window, "Date", "2026-05-03");
     window.click("Attach");
@@ -506,7 +499,7 @@ fn a_table_is_saved_alone() {
     let file = folder.path().join("members.csv");
     window.ask(Action::Save(Taken::Table("members")));
     window.frames(3);
-    type_into(&mut window, "File", &file.display().to_string());
+    type_into(&mut window, "File to write", &file.display().to_string());
     window.harness.get_by_role_and_label(egui::accesskit::Role::Button, "Save").click();
     window.until("the table", |_| file.exists());
     let table = std::fs::read_to_string(&file).expect("a table");

@@ -258,7 +258,7 @@ fn run(world: &mut World, system: SystemId<InMut<'static, Ui>>, name: &str, ui: 
 
 fn panels(ui: &mut Ui, world: &mut World) {
     Side::top("menu").show(ui, |ui| menu(ui, world));
-    Side::bottom("status").exact_size(26.0).show(ui, |ui| status(ui, world));
+    Side::bottom("status").exact_size(24.0).show(ui, |ui| status(ui, world));
     CentralPanel::default().frame(egui::Frame::NONE).show(ui, |ui| {
         workspace::show(ui, world, &mut |panel, ui, world| {
             run(world, panel.system, &panel.name, ui);
@@ -315,7 +315,7 @@ fn menu(ui: &mut Ui, world: &mut World) {
                 ui.ctx().send_viewport_cmd(egui::ViewportCommand::Close);
             }
         });
-        ui.menu_button("Save", |ui| {
+        ui.menu_button("Save…", |ui| {
             let latest = world.resource::<Latest>();
             let has = scene.as_ref().is_some_and(|s| latest.result_for(s).is_some());
             saving::menu(ui, has, &mut asked);

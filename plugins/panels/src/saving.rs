@@ -141,7 +141,7 @@ pub(crate) fn sheet(
         Taken::Picture(_) => "PNG, as it is seen now.".to_owned(),
     });
     ui.horizontal(|ui| {
-        let label = ui.label(if is_report { "Folder" } else { "File" });
+        let label = ui.label(if is_report { "Folder to write" } else { "File to write" });
         ui.add(TextEdit::singleline(&mut saving.path).desired_width(280.0)).labelled_by(label.id);
         if ui.button("Browse…").clicked() {
             actions.ask(Action::ChooseSave);
@@ -222,9 +222,10 @@ pub(crate) fn picture(ui: &Ui, world: &mut World) {
         });
         saving.coming = Some(Mutex::new(theirs));
     }
-    let image = saving.coming.as_ref().and_then(|coming| {
-        coming.lock().unwrap_or_else(PoisonError::into_inner).try_recv().ok()
-    });
+    let image = saving
+        .coming
+        .as_ref()
+        .and_then(|coming| coming.lock().unwrap_or_else(PoisonError::into_inner).try_recv().ok());
     if let Some(image) = image
         && let Some((path, of)) = saving.wanted.take()
     {

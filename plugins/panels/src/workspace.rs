@@ -30,7 +30,7 @@ const DEEPEST: usize = 32;
 const EXPERT: [&str; 8] =
     ["Render", "Inspector", "Meters", "Directions", "Convergence", "Steering", "Jobs", "Log"];
 /// Width that a member's sheet wants, points, and its bounds as shares of the window.
-const SHEET: (f32, f32, f32) = (330.0, 0.26, 0.36);
+const SHEET: (f32, f32, f32) = (322.0, 0.25, 0.36);
 
 /// Two ways to arrange the window.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]

@@ -55,11 +55,6 @@ impl Listing {
                 self.is_long = !self.is_long;
             }
         }
-        let attach = ui.button("Attach evidence…");
-        let hint = "Findings, CT slices, tables (A); or drop the files on the window";
-        if attach.on_hover_text(hint).clicked() {
-            actions.ask(Action::Fill(Vec::new()));
-        }
         let Some(result) = result else { return };
         let items: Vec<_> =
             result.items.iter().filter(|i| i.member == member.id).cloned().collect();

@@ -49,7 +49,8 @@ pub(super) fn links(
         });
     }
     if is_empty {
-        ui.weak("None.");
+        let comes = !member.slices.is_empty() && told.is_none();
+        ui.weak(if comes { "They come with the prediction." } else { "None." });
     }
 }
 

@@ -38,10 +38,11 @@ pub(crate) fn member(
         return;
     };
     head(ui, member);
+    // Above what grows while it is predicted: a button stays where it is.
+    ways(ui, scene, member, &mut actions);
     standing(ui, index, &latest, &mut actions);
     let result = latest.result_for(scene);
     let told = result.and_then(|r| r.members.get(index));
-    ways(ui, scene, member, &mut actions);
     if let Some(predicted) = latest.member(index) {
         section(ui, "Damage along the member", |ui| bars::bars(ui, predicted));
     }
@@ -100,7 +101,12 @@ fn standing(ui: &mut Ui, index: usize, latest: &Latest, actions: &mut Actions) {
         ui.strong(&verdict.state);
     });
     probable(ui, predicted, latest);
-    let by = verdict.within_months.map_or(String::new(), |m| format!(" (within {m} months)"));
+    let by = match verdict.within_months {
+        None => String::new(),
+        Some(0) => " (at once)".into(),
+        Some(1) => " (within a month)".into(),
+        Some(months) => format!(" (within {months} months)"),
+    };
     ui.label(format!("{}{by}", verdict.advice));
     if predicted.conflict {
         ui.label("⚠ Pieces of evidence contradict each other.");
@@ -151,6 +157,11 @@ fn ways(ui: &mut Ui, scene: &Scene, member: &Member, actions: &mut Actions) {
         }
         if scene.structure.assembly_of(&member.id).is_some() && ui.button("Its stress").clicked() {
             actions.ask(Action::Tab("Stress"));
+        }
+        let attach = ui.button("Attach evidence…");
+        let hint = "Findings, CT slices, tables (A); or drop the files on the window";
+        if attach.on_hover_text(hint).clicked() {
+            actions.ask(Action::Fill(Vec::new()));
         }
     });
 }
