@@ -159,7 +159,9 @@ fn all(world: &World) -> Vec<Command> {
 /// Puts what keys ask for into the actions. A field that has the focus keeps its letters; keys with
 /// Ctrl and those at the top of the keyboard act anywhere.
 pub(crate) fn keys(ui: &Ui, world: &mut World) {
-    let is_typing = ui.ctx().memory(|m| m.focused().is_some());
+    let is_typing = ui.ctx().text_edit_focused();
+    // A button that has the focus is pressed by it.
+    let has_focus = ui.ctx().memory(|m| m.focused().is_some());
     let commands = fixed(world.resource::<Look>());
     let acts_anywhere = |modifiers: Modifiers, key: Key| {
         modifiers.command && !matches!(key, Key::Z | Key::Y)
@@ -168,7 +170,8 @@ pub(crate) fn keys(ui: &Ui, world: &mut World) {
     let asked: Vec<Action> = ui.input_mut(|i| {
         let own = commands.into_iter().filter_map(|c| Some((c.shortcut?, c.action)));
         own.filter(|((modifiers, key), _)| {
-            if is_typing && !acts_anywhere(*modifiers, *key) {
+            let is_taken = is_typing || has_focus && *key == Key::Space;
+            if is_taken && !acts_anywhere(*modifiers, *key) {
                 return false;
             }
             if modifiers.any() {

@@ -112,6 +112,9 @@ pub(crate) fn greet(
     let same = Some(&scene.path).filter(|path| path.exists() && **path == open.path);
     let member = selection.0.filter(|_| same.is_some()).and_then(|i| open.members.get(i));
     selection.0 = member.and_then(|id| scene.members.iter().position(|m| m.id == *id));
+    if same.is_none() && desk.shown() == Workspace::Inspector {
+        desk.open("Structure");
+    }
     *open = Open {
         path: scene.path.clone(),
         members: scene.members.iter().map(|m| m.id.clone()).collect(),
@@ -439,15 +442,13 @@ fn sheets(
     command::sheet(ui, world);
     let mut open = world.resource::<Form>().is_open;
     if open {
-        let height = (ui.ctx().content_rect().height() - 120.0).max(80.0);
         // It may be drawn aside, to see where on the member something is.
-        egui::Window::new("Attach evidence").open(&mut open).collapsible(false).show(
-            ui.ctx(),
-            |ui| {
-                let area = egui::ScrollArea::vertical().max_height(height);
-                area.show(ui, |ui| run(world, form, "attach evidence", ui));
-            },
-        );
+        egui::Window::new("Attach evidence")
+            .open(&mut open)
+            .collapsible(false)
+            .resizable(false)
+            .default_pos(ui.ctx().content_rect().center() - egui::vec2(320.0, 300.0))
+            .show(ui.ctx(), |ui| run(world, form, "attach evidence", ui));
         world.resource_mut::<Form>().is_open &= open;
     }
     let mut open = world.resource::<Saving>().is_shown();

@@ -6,7 +6,7 @@ mod fill;
 use std::path::{Path, PathBuf};
 
 use bevy_ecs::prelude::*;
-use egui::{ComboBox, Grid, TextEdit, Ui};
+use egui::{ComboBox, Grid, ScrollArea, TextEdit, Ui};
 use intrados_scene::{
     Scene,
     attach::{Attachment, Cut, Face, Finding, Kind, What},
@@ -149,8 +149,17 @@ pub(crate) fn form(
         }
     });
     ui.separator();
+    // The button stays in sight however many fields there are.
+    let most = (ui.ctx().content_rect().height() - 230.0).max(60.0);
+    let area = ScrollArea::vertical().max_height(most).min_scrolled_height(most);
+    area.show(ui, |ui| fields(ui, form, &mut actions));
+    ui.separator();
+    send(ui, form, &scene.0, &mut actions);
+}
+
+fn fields(ui: &mut Ui, form: &mut Form, actions: &mut Actions) {
     if form.sort != Some(Sort::Finding) {
-        files(ui, form, &mut actions);
+        files(ui, form, actions);
     }
     Grid::new("form").num_columns(2).spacing([10.0, 5.0]).show(ui, |ui| {
         match form.sort {
@@ -161,8 +170,6 @@ pub(crate) fn form(
         }
         place(ui, form);
     });
-    ui.separator();
-    send(ui, form, &scene.0, &mut actions);
 }
 
 /// The button, and what keeps it from being pressed.

@@ -407,7 +407,7 @@ fn scale(ui: &Ui, rect: Rect, camera: &Camera) {
 /// Colours with their damages, and what has none.
 pub(super) fn legend(ui: &Ui, rect: Rect) {
     const STEPS: usize = 48;
-    let height = (rect.height() * 0.4).clamp(50.0, 220.0);
+    let height = (rect.height() * 0.28).clamp(50.0, 220.0);
     let back = Rect::from_min_size(
         pos2(rect.right() - LEGEND - 6.0, rect.bottom() - height - 84.0),
         vec2(LEGEND, height + 78.0),
