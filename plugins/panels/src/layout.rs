@@ -281,10 +281,11 @@ fn status(ui: &mut Ui, world: &mut World) {
         if count > 1 {
             ui.menu_button(format!("and {} more", count - 1), |ui| log::list(ui, jobs));
         }
-        // What a banner says need not be said twice.
+        // What a banner says, or has said until it was put away, need not be said twice.
         if count == 0
             && world.resource::<Banners>().lines().is_empty()
             && let Some(line) = world.resource::<Log>().lines().last()
+            && !line.starts_with('⚠')
         {
             ui.add(egui::Label::new(egui::RichText::new(line).weak()).truncate());
         }
