@@ -15,7 +15,7 @@ CIRCLES = {
     "mechanics": [{"element", "mesh"}],
     "panels": [
         {"picture", "refine", "statistics", "viewpoint"},
-        {"action", "banner", "ct", "dialog", "export", "layout", "members", "photos", "render", "report", "start", "stress"},
+        {"action", "attach", "banner", "command", "ct", "dialog", "edits", "export", "layout", "members", "photos", "report", "saving", "start", "stress", "structure"},
     ],
     "scene": [{"file", "load", "parametric"}, {"member", "scene", "structure"}],
 }

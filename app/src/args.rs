@@ -87,6 +87,11 @@ pub(crate) enum Command {
     /// The window (this is also what happens without a command)
     #[command(after_help = "Example:\n  intrados view scenes/column.ron")]
     View(View),
+    /// A picture of the window, as somebody would see it once the prediction is done
+    #[command(
+        after_help = "Examples:\n  intrados screenshot column --member C2 --out window.png\n  xvfb-run -a intrados screenshot bridge.ron --tab Report --size 1600x1000 --theme light --out report.png"
+    )]
+    Screenshot(Screenshot),
     /// What is in a file: sizes, members, lamps, cameras, meters
     #[command(after_help = "Example:\n  intrados info bridge.glb --format json")]
     Info(Files),
@@ -178,6 +183,68 @@ pub(crate) enum Command {
 pub(crate) struct View {
     /// What to open
     pub(crate) scene: Option<PathBuf>,
+}
+
+// What a picture of the window shows.
+#[derive(Debug, Args)]
+pub(crate) struct Screenshot {
+    /// A scene or a model, or the name of a bundled scene
+    pub(crate) scene: PathBuf,
+    /// Panel that is in front: Structure, Photos, CT, Stress, Report, Render …
+    #[arg(long, value_name = "NAME")]
+    pub(crate) tab: Option<String>,
+    /// Id or name of the member that is selected
+    #[arg(long, value_name = "MEMBER")]
+    pub(crate) member: Option<String>,
+    /// How the panels lie
+    #[arg(long, value_enum, default_value_t = WindowLayout::Inspector)]
+    pub(crate) layout: WindowLayout,
+    /// Points across and down
+    #[arg(long, value_name = "WxH", default_value = "1280x800", value_parser = window_size)]
+    pub(crate) size: [u32; 2],
+    /// Pixels a point: 2 is what screens of high density have
+    #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = window_scale)]
+    pub(crate) scale: f32,
+    /// Colours of the window
+    #[arg(long, value_enum, default_value_t = WindowTheme::Dark)]
+    pub(crate) theme: WindowTheme,
+    /// Longest to wait for the prediction, seconds; then the window is taken as it is
+    #[arg(long, value_name = "SECONDS", default_value_t = 300)]
+    pub(crate) wait: u64,
+    /// PNG that is written
+    #[arg(long, short, value_name = "FILE")]
+    pub(crate) out: PathBuf,
+}
+
+/// See [`Screenshot::layout`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum WindowLayout {
+    /// The structure, and a member's sheet
+    Inspector,
+    /// Estimators, meters, fields and convergence
+    Expert,
+}
+
+/// See [`Screenshot::theme`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum WindowTheme {
+    Light,
+    Dark,
+}
+
+fn window_size(text: &str) -> Result<[u32; 2], String> {
+    let side = |text: &str| text.parse().ok().filter(|n| (300..=8000).contains(n));
+    let sides = text.split_once(['x', '×']);
+    sides
+        .and_then(|(w, h)| Some([side(w)?, side(h)?]))
+        .ok_or_else(|| "give two numbers between 300 and 8000, such as 1280x800".into())
+}
+
+fn window_scale(text: &str) -> Result<f32, String> {
+    match text.parse::<f32>() {
+        Ok(scale) if (0.5..=4.0).contains(&scale) => Ok(scale),
+        _ => Err("give a number between 0.5 and 4".into()),
+    }
 }
 
 #[derive(Debug, Args)]

@@ -14,6 +14,7 @@ fn all() -> String {
     let commands = [
         "",
         "view",
+        "screenshot",
         "info",
         "validate",
         "new",

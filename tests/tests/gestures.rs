@@ -139,7 +139,7 @@ impl Hand {
         let at = dice.place(self.size);
         match dice.below(100) {
             0..22 => {
-                let picture = self.find("Picture");
+                let picture = self.find("Picture").or_else(|| self.find("Damage of members"));
                 let begin = picture.unwrap_or(at);
                 let button = dice.one(&[
                     PointerButton::Primary,
@@ -192,6 +192,13 @@ impl Hand {
                     "Log",
                     "File",
                     "View",
+                    "Edit",
+                    "Save…",
+                    "Commands",
+                    "Expert",
+                    "Structure",
+                    "Member",
+                    "Attach evidence…",
                     "Keys",
                 ]);
                 if let Some(at) = self.find(tab) {

@@ -21,11 +21,10 @@ use intrados_mechanics::{
 };
 use intrados_panels::{
     Action, Actions, AddPanel, Latest, Log, Look, PanelsPlugin, Place, Quantity, Refine, Selection,
-    Statistics, Viewpoint, show,
+    Statistics, Taken, Viewpoint, Workspace, plus_minus, show,
 };
 use intrados_photo::{Pose, Site};
-use intrados_predict::Progress;
-use intrados_predict::predict;
+use intrados_predict::{PredictSettings, Predicting, Progress, predict};
 use intrados_scene::{
     Camera, CrackSurface, Member, Mouth, Scene, SurfaceDamage, plugin::CurrentScene,
 };
@@ -57,6 +56,10 @@ impl Window {
         app.add_plugins(PanelsPlugin { slice, ..PanelsPlugin::default() });
         app.world_mut().resource_mut::<MeasureSettings>().enabled = false;
         add(&mut app);
+        Self::of(app)
+    }
+
+    fn of(mut app: App) -> Self {
         app.finish();
         app.cleanup();
         let app = Rc::new(RefCell::new(app));
@@ -117,9 +120,10 @@ impl Window {
         })
     }
 
-    /// A window with a bundled scene whose picture has begun, at its full size.
+    /// An expert's window with a bundled scene whose picture has begun, at its full size.
     fn with_scene(name: &str) -> Self {
         let mut window = Self::new(|_| {});
+        window.ask(Action::Arrange(Workspace::Expert));
         window.ask(Action::Open(name.into()));
         window.until("a picture", |w| {
             !w.resource::<Viewpoint>().is_preview()
@@ -182,6 +186,7 @@ fn a_large_picture_begins_small_and_becomes_large() {
     // Where frames have a time, the large film is got ready off the frame.
     for slice in [None, Some(Duration::from_millis(2))] {
         let mut window = Window::paced(slice, |_| {});
+        window.ask(Action::Arrange(Workspace::Expert));
         window.ask(Action::Open("column".into()));
         window.until("a small picture", |w| w.resource::<Viewpoint>().is_preview());
         let small = window.with(|w| w.resource::<RenderSettings>().sides);
@@ -308,17 +313,13 @@ fn every_tab_draws() {
     });
     window.ask(Action::Select(Some(1)));
     window.click("Report");
+    assert!(window.harness.query_by_label_contains("Evidence: ").is_some());
+    window.click("Structure");
     assert!(window.harness.query_by_label("Damage of members").is_some());
     // From the member's sheet to its slices.
+    window.click("Member");
     window.click("Its slices");
-    for _ in 0..2_000 {
-        window.frame();
-        if window.harness.query_by_label("CT slice").is_some() {
-            break;
-        }
-        std::thread::sleep(std::time::Duration::from_millis(1));
-    }
-    assert!(window.harness.query_by_label("CT slice").is_some());
+    window.until_seen("CT slice");
     for tab in ["Jobs", "Log", "Convergence", "Render"] {
         window.click(tab);
     }
@@ -326,6 +327,215 @@ fn every_tab_draws() {
     // A window of egui measures itself before it is seen.
     window.frames(4);
     assert!(window.harness.query_by_label("pause or continue").is_some());
+}
+
+/// An inspector's window with the bundled column, without its prediction's lives and its network.
+fn with_column() -> Window {
+    let mut window = Window::new(|app| {
+        app.world_mut().resource_mut::<Predicting>().settings =
+            PredictSettings { forecast: None, ..PredictSettings::default() };
+    });
+    window.ask(Action::Open("column".into()));
+    window.until("a scene", |w| w.contains_resource::<CurrentScene>());
+    window.frames(2);
+    window
+}
+
+/// Of the window's area, the structure has two thirds; a member's sheet says what the prediction
+/// said, and nothing that only experts read is in sight.
+#[test]
+fn a_structure_fills_the_window_and_a_member_has_its_sheet_beside_it() {
+    let mut window = with_column();
+    window.until("the prediction", |w| w.resource::<Latest>().result.is_some());
+    window.frames(2);
+    let picture = window.harness.get_by_label("Damage of members").rect();
+    // Around it the harness leaves 8 points free on every side.
+    assert!(picture.area() >= (1280.0 - 16.0) * (800.0 - 16.0) * 2.0 / 3.0, "{picture}");
+    let (names, result) = window.with(|w| {
+        let scene = w.resource::<CurrentScene>().0.clone();
+        let names: Vec<String> = scene.members.iter().map(|m| m.name.clone()).collect();
+        (names, w.resource::<Latest>().result.clone().expect("a prediction"))
+    });
+    for (index, name) in names.iter().enumerate() {
+        window.click(name);
+        assert_eq!(window.with(|w| *w.resource::<Selection>()), Selection(Some(index)));
+        let said = &result.members[index];
+        let (damage, error) = said.damage.zip(said.damage_std_error).expect("it is damaged");
+        let shown = format!("d = {}", plus_minus(damage, error, "").trim());
+        let seen = |text: &str| window.harness.query_all_by_label(text).next().is_some();
+        assert!(seen(&shown), "{name}: {shown}");
+        assert!(seen(&said.state), "{name}: {}", said.state);
+        for p in said.state_probability.values() {
+            assert!(seen(&format!("{:.0} %", 100.0 * p)), "{name}: {p}");
+        }
+        for evidence in said.evidence.values() {
+            assert!(seen(&evidence.basis), "{name}: {}", evidence.basis);
+        }
+        for defect in said.defects.iter().take(20) {
+            assert!(seen(defect.kind), "{name}: {}", defect.kind);
+        }
+        assert_eq!(seen("Faces with defects"), !said.defects.is_empty(), "{name}");
+    }
+    // A click beside all members shows the structure again.
+    window.harness.key_press(Key::Escape);
+    window.frames(2);
+    assert!(window.harness.query_by_label("The most damaged").is_some());
+    let experts = ["Gap", "Convergence", "Meters", "Steering", "Directions"];
+    let seen =
+        |window: &Window, what: &str| window.harness.query_all_by_label(what).next().is_some();
+    assert!(experts.iter().all(|what| !seen(&window, what)));
+    window.harness.key_press(Key::F9);
+    window.frames(3);
+    assert!(experts[1..].iter().all(|what| seen(&window, what)));
+}
+
+/// While nobody sees the picture, no walk is made for it; whoever opens it gets it.
+#[test]
+fn a_picture_that_nobody_sees_rests() {
+    let mut window = with_column();
+    let before = window.walks();
+    window.frames(5);
+    assert_eq!((window.walks(), window.with(|w| *w.resource::<Pace>())), (before, Pace::Rest));
+    window.ask(Action::Tab("Render"));
+    window.until("a picture", |w| {
+        w.get_resource::<Render>().is_some_and(|r| r.samples_per_pixel() > 0.0)
+    });
+}
+
+/// A click in the picture of the structure selects the member that is there.
+#[test]
+fn a_member_is_picked_in_the_structure() {
+    let mut window = with_column();
+    window.frames(2);
+    let rect = window.harness.get_by_label("Damage of members").rect();
+    let mut picked = std::collections::BTreeSet::new();
+    for k in 1..20 {
+        let at = rect.lerp_inside(egui::vec2(k as f32 / 20.0, 0.5));
+        press(&mut window, at);
+        picked.extend(window.with(|w| w.resource::<Selection>().0));
+    }
+    assert!(picked.len() >= 2, "{picked:?}");
+}
+
+#[test]
+fn the_palette_does_what_is_typed() {
+    let mut window = with_column();
+    window.harness.key_press_modifiers(egui::Modifiers::COMMAND, Key::P);
+    window.frames(3);
+    window.harness.get_by_label("Command").type_text("member 2");
+    window.frames(2);
+    window.harness.key_press(Key::Enter);
+    window.frames(3);
+    assert!(window.with(|w| w.resource::<Selection>().0.is_some()));
+    assert!(window.harness.query_by_label("Command").is_none(), "it is put away");
+    window.harness.key_press_modifiers(egui::Modifiers::COMMAND, Key::K);
+    window.frames(3);
+    window.harness.get_by_label("Command").type_text("panel log");
+    window.frames(2);
+    window.harness.key_press(Key::Enter);
+    window.frames(3);
+    assert!(window.harness.query_by_label_contains("opened column").is_some());
+}
+
+/// Types into a field of this name, in place of what was there.
+fn type_into(window: &mut Window, field: &str, text: &str) {
+    window.harness.get_by_label(field).focus();
+    window.frame();
+    window.harness.key_combination_modifiers(egui::Modifiers::COMMAND, &[Key::A]);
+    window.frame();
+    window.harness.get_by_label(field).type_text(text);
+    window.frames(2);
+}
+
+/// A finding is noted in the form; what was predicted before is outdated until the next prediction
+/// is there; the member stays selected, and Ctrl+Z takes it back.
+#[test]
+fn a_finding_is_noted_in_the_form_and_taken_back() {
+    let (mut window, folder) = with_lonely();
+    window.until("the prediction", |w| {
+        w.get_resource::<Latest>().is_some_and(|l| l.result.is_some())
+    });
+    let evidence = folder.path().join("evidence.ron");
+    window.ask(Action::Select(Some(0)));
+    window.frames(2);
+    window.click("Attach evidence…");
+    window.until_seen("Fill in its width, mm.");
+    type_into(&mut window, "width, mm", "0.7");
+    type_into(&mut window, "Date", "2026-05-03");
+    window.click("Attach");
+    let observed = |w: &mut World| w.resource::<CurrentScene>().0.structure.observations.len();
+    let mut was_outdated = false;
+    window.until("the evidence", |w| observed(w) == 1);
+    for _ in 0..PATIENCE {
+        was_outdated |= window.harness.query_by_label("⚠ Outdated").is_some();
+        if window.with(|w| w.resource::<Latest>().result.is_some()) {
+            break;
+        }
+        window.frame();
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    assert!(was_outdated, "old numbers stood there as if nothing had happened");
+    window.frames(2);
+    assert!(window.harness.query_by_label("⚠ Outdated").is_none());
+    assert_eq!(window.with(|w| *w.resource::<Selection>()), Selection(Some(0)));
+    assert!(window.harness.query_by_label("2026-05-03").is_some(), "its row in the sheet");
+    let said = window.with(|w| w.resource::<Latest>().result.clone()).expect("a prediction");
+    assert!(said.members[0].evidence.contains_key("survey"));
+    let written = std::fs::read(&evidence).expect("the evidence");
+    window.harness.key_press_modifiers(egui::Modifiers::COMMAND, Key::Z);
+    window.until("the scene without it", |w| observed(w) == 0);
+    assert!(!evidence.exists());
+    let again = egui::Modifiers::COMMAND | egui::Modifiers::SHIFT;
+    window.harness.key_press_modifiers(again, Key::Z);
+    window.until("the scene with it", |w| observed(w) == 1);
+    assert_eq!(std::fs::read(&evidence).expect("the evidence"), written);
+}
+
+/// A table of the prediction is saved alone, and says what the report's says.
+#[test]
+fn a_table_is_saved_alone() {
+    let mut window = with_column();
+    window.until("the prediction", |w| w.resource::<Latest>().result.is_some());
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("members.csv");
+    window.ask(Action::Save(Taken::Table("members")));
+    window.frames(3);
+    type_into(&mut window, "File to write", &file.display().to_string());
+    window.harness.get_by_role_and_label(egui::accesskit::Role::Button, "Save").click();
+    window.until("the table", |_| file.exists());
+    let table = std::fs::read_to_string(&file).expect("a table");
+    let result = window.with(|w| w.resource::<Latest>().result.clone()).expect("a prediction");
+    assert_eq!(table.lines().count(), 1 + result.members.len());
+    assert!(result.members.iter().all(|m| table.contains(&m.id)));
+}
+
+/// How panels lie is there again in the next session, and what was closed stays closed.
+#[test]
+fn a_layout_survives_a_restart() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("layout.json");
+    let open = || {
+        let mut app = intrados::simulation();
+        let layout = Some(file.clone());
+        app.add_plugins(PanelsPlugin { layout, ..PanelsPlugin::default() });
+        let mut window = Window::of(app);
+        window.ask(Action::Open("column".into()));
+        window.until("a scene", |w| w.contains_resource::<CurrentScene>());
+        window.frames(3);
+        window
+    };
+    let mut window = open();
+    assert!(window.harness.query_by_label("Members").is_some());
+    window.ask(Action::Panel("Members".into(), false));
+    window.ask(Action::Panel("Log".into(), true));
+    window.frames(3);
+    drop(window);
+    let mut window = open();
+    let seen = |window: &Window, what: &str| window.harness.query_by_label(what).is_some();
+    assert!(!seen(&window, "Members") && seen(&window, "Log"));
+    window.ask(Action::ResetLayout);
+    window.frames(3);
+    assert!(seen(&window, "Members") && !seen(&window, "Log"));
 }
 
 /// The preview that a moving camera gets has fewer pixels than the picture that the pointer is

@@ -2,14 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use intrados_ct::{Picture, Slice, Slices, source::SliceSource};
 use intrados_photo::Photograph;
+use intrados_predict::attaching::{self, Unfit};
 use intrados_scene::{
-    Scene,
-    attach::{Attachment, Cut, Finding, Listed, Project, Proposal, Raw, What},
+    attach::{Attachment, Cut, Finding, Listed, Project, Raw, What},
     structure::{Course, Electrode},
 };
-use intrados_survey::photographed::{self, PhotoError};
 use serde::Serialize;
 
 use super::detach::{known_as, rows};
@@ -46,9 +44,11 @@ pub(crate) fn run(session: &Session, args: &args::Attach) -> Result<Outcome, Fai
     let what = Attachment { member: known_as(session, &project, &args.member)?, ..what };
     let progress = session.watch(format!("attaching to {}", args.project.display()));
     let proposal = project.propose(&what, &session.job)?;
-    let mut notes = doubts(&proposal, &what, &args.files)?;
-    notes.extend(placed(session, &proposal, &what)?);
-    notes.extend(proposal.notes.iter().cloned());
+    let notes =
+        attaching::examine(&proposal, &what, &session.job).map_err(|unfit| match unfit {
+            Unfit::Because(why) => Failure::BadInput(why),
+            Unfit::Cancelled => Failure::Interrupted,
+        })?;
     let (name, added) = (proposal.name.clone(), proposal.added.clone());
     let member_name = proposal.scene.name_of(&what.member).to_owned();
     let files = proposal.commit()?;
@@ -67,133 +67,6 @@ pub(crate) fn run(session: &Session, args: &args::Attach) -> Result<Outcome, Fai
     };
     session.print(&report, || report.table())?;
     Ok(Outcome::Done)
-}
-
-/// Refuses slices that a prediction would not use; gives what their files say against it.
-fn doubts(
-    proposal: &Proposal<'_>,
-    what: &Attachment,
-    given: &[PathBuf],
-) -> Result<Vec<String>, Failure> {
-    let scene = &proposal.scene;
-    let member = scene.members.iter().position(|m| m.id == what.member).unwrap_or_default();
-    let mut doubts = Vec::new();
-    let ours = |slice: &SliceSource| slice.core == proposal.name;
-    for slice in SliceSource::of_member(scene, member).into_iter().filter(ours) {
-        if let Some(why) = slice.refusal(scene) {
-            return Err(Failure::BadInput(as_given(&why, given)));
-        }
-        doubts.extend(slice.doubt().map(|doubt| as_given(&doubt, given)));
-    }
-    if let What::Slices { files, pixel_mm, cut } = &what.what {
-        let is_label = |file: &&PathBuf| file.to_string_lossy().contains("_mask-");
-        for file in files.iter().filter(|file| !is_label(file)) {
-            if let Some(why) = too_wide(scene, member, file, *pixel_mm, cut) {
-                return Err(Failure::BadInput(why));
-            }
-        }
-    }
-    Ok(doubts)
-}
-
-/// How much wider than its core, or than its member from corner to corner, what a picture shows may
-/// be.
-const WIDER: f64 = 1.1;
-
-/// Why what a picture shows is larger than what it was cut out of: its pixels are not so large.
-fn too_wide(
-    scene: &Scene,
-    index: usize,
-    path: &Path,
-    pixel_mm: Option<f32>,
-    cut: &Cut,
-) -> Option<String> {
-    let picture = Slices::open(path, pixel_mm).ok()?.only().ok()?;
-    let [wide, thin] = shown_mm(&picture);
-    let member = scene.members.get(index)?;
-    let size = f64::from((member.bounds[1] - member.bounds[0]).length()) * 1e3;
-    let pixel = picture.pixel_mm;
-    let path = path.display();
-    match cut.diameter_mm.map(f64::from) {
-        // Across, it is as wide as the core; along, as thin.
-        Some(core) if thin > WIDER * core => Some(format!(
-            "{path}: at {pixel} mm a pixel what it shows is {thin:.0} mm across, and the core {core} mm: is --pixel-mm in µm, or --diameter-mm wrong?"
-        )),
-        _ if size > 0.0 && wide > WIDER * size => Some(format!(
-            "{path}: at {pixel} mm a pixel what it shows is {:.1} m wide, and {} {:.1} m from corner to corner: is the pixel in µm? write {}",
-            wide / 1e3,
-            member.name,
-            size / 1e3,
-            pixel / 1000.0
-        )),
-        _ => None,
-    }
-}
-
-/// Sides of the box around what is not air, mm, the longer one first: what is brighter than the
-/// middle between the darkest and the brightest hundredth.
-fn shown_mm(slice: &Slice) -> [f64; 2] {
-    let (width, height) = (slice.grey.width, slice.grey.height);
-    let mut sorted: Vec<f32> = slice.grey.data.iter().copied().filter(|g| g.is_finite()).collect();
-    sorted.sort_unstable_by(f32::total_cmp);
-    let rank = |share: usize| sorted.get((sorted.len().saturating_sub(1)) * share / 100);
-    let [Some(dark), Some(bright)] = [rank(1), rank(99)] else { return [0.0; 2] };
-    let middle = 0.5 * (dark + bright);
-    // A line of which so little is bright is noise.
-    let is_seen = |bright: usize, of: usize| 20 * bright > of;
-    let extent = |lines: usize, of: usize, at: &dyn Fn(usize, usize) -> usize| {
-        let seen = (0..lines).filter(|&line| {
-            let bright = (0..of)
-                .filter(|&k| slice.grey.data.get(at(line, k)).is_some_and(|grey| *grey > middle));
-            is_seen(bright.count(), of)
-        });
-        let ends = seen.fold([usize::MAX, 0], |[a, b], line| [a.min(line), b.max(line)]);
-        (ends[1] + 1).saturating_sub(ends[0]) as f64 * f64::from(slice.pixel_mm)
-    };
-    let across = extent(width, height, &|column, row| row * width + column);
-    let down = extent(height, width, &|row, column| row * width + column);
-    [across.max(down), across.min(down)]
-}
-
-/// Refuses a photograph that cannot be placed; says from where it was taken.
-fn placed(
-    session: &Session,
-    proposal: &Proposal<'_>,
-    what: &Attachment,
-) -> Result<Option<String>, Failure> {
-    let What::Photograph { files, .. } = &what.what else { return Ok(None) };
-    let all = &proposal.scene.structure.photographs;
-    let ours = all.iter().find(|p| p.member == what.member && p.name == proposal.name);
-    let Some(photo) = ours else { return Ok(None) };
-    match photographed::placed(&proposal.scene, photo, &session.job) {
-        Ok((_, _, located)) => {
-            let [x, y, z] = located.pose.position.to_array();
-            let rms = located.rms_px;
-            Ok(Some(format!("taken from ({x:.2}, {y:.2}, {z:.2}) m, picks fit to {rms:.1} pixels")))
-        }
-        Err(PhotoError::Cancelled(_)) => Err(Failure::Interrupted),
-        Err(PhotoError::Because(why)) => {
-            let given = as_given(&why, files);
-            let named = files.iter().any(|f| given.contains(&f.display().to_string()));
-            let line = if named { given } else { format!("{}: {given}", files[0].display()) };
-            Err(Failure::BadInput(line))
-        }
-    }
-}
-
-/// A message about a copy, about the file that it was made of.
-fn as_given(message: &str, given: &[PathBuf]) -> String {
-    let named = |file: &&PathBuf| {
-        let name = file.file_name().unwrap_or_default().to_string_lossy();
-        message.split_once(": ").is_some_and(|(path, _)| {
-            Path::new(path).file_name().is_some_and(|n| n.to_string_lossy() == name)
-        })
-    };
-    let rest = message.split_once(": ").map_or(message, |(_, rest)| rest);
-    given
-        .iter()
-        .find(named)
-        .map_or_else(|| message.to_owned(), |file| format!("{}: {rest}", file.display()))
 }
 
 fn attachment(args: &args::Attach) -> Result<Attachment, Failure> {
@@ -215,15 +88,8 @@ fn attachment(args: &args::Attach) -> Result<Attachment, Failure> {
 /// A photograph that the report can show.
 fn picture(file: Option<&Path>) -> Result<Option<PathBuf>, Failure> {
     let Some(file) = file else { return Ok(None) };
-    let ending = file.extension().unwrap_or_default().to_ascii_lowercase();
-    let bad = |why| Failure::BadInput(format!("{}: {why}", file.display()));
-    match ["jpg", "jpeg", "png"].iter().any(|known| ending == *known) {
-        false => Err(bad("is neither a JPEG nor a PNG: convert it")),
-        true if file.is_file() && Picture::read(file, 8).is_none() => {
-            Err(bad("is no picture, or larger than 20 000 pixels: save it again"))
-        }
-        true => Ok(Some(file.to_owned())),
-    }
+    attaching::picture(file).map_err(Failure::BadInput)?;
+    Ok(Some(file.to_owned()))
 }
 
 fn what(args: &args::Attach) -> Result<What, Failure> {

@@ -16,6 +16,7 @@ mod predict;
 mod render;
 mod scan;
 mod schema;
+mod screenshot;
 mod validate;
 mod verify;
 mod view;
@@ -33,6 +34,7 @@ pub(crate) fn run(cli: &Cli, session: &Session) -> Result<Outcome, Failure> {
     match &cli.command {
         None => view::run(session, &crate::args::View::default()),
         Some(Command::View(args)) => view::run(session, args),
+        Some(Command::Screenshot(args)) => screenshot::run(session, args),
         Some(Command::Info(args)) => info::run(session, args),
         Some(Command::Validate(args)) => validate::run(session, args),
         Some(Command::New(args)) => new::run(session, args),

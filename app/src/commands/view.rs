@@ -3,6 +3,8 @@
 #[cfg(feature = "desktop")]
 use std::{error::Error, path::Path, sync::Arc};
 
+#[cfg(feature = "desktop")]
+use bevy_app::App;
 use clap::CommandFactory;
 #[cfg(feature = "desktop")]
 use intrados_light::Render;
@@ -30,7 +32,7 @@ pub(crate) fn run(session: &Session, args: &View) -> Result<Outcome, Failure> {
 }
 
 /// Why there can be no window, if so.
-fn no_window() -> Option<&'static str> {
+pub(super) fn no_window() -> Option<&'static str> {
     if cfg!(not(feature = "desktop")) {
         return Some("this program was built without its window (feature `desktop`)");
     }
@@ -42,24 +44,38 @@ fn no_window() -> Option<&'static str> {
 
 #[cfg(feature = "desktop")]
 fn open(session: &Session, args: &View) -> Result<Outcome, Failure> {
-    if let Some(scene) = args.scene.as_ref().filter(|s| {
-        !s.exists() && intrados_scene::bundled().iter().all(|(n, _)| Path::new(n) != stem(s))
-    }) {
-        return Err(Failure::NoInput(format!(
-            "{}: there is no such file or bundled scene: check the path",
-            scene.display()
-        )));
+    if let Some(scene) = &args.scene {
+        exists(scene)?;
     }
-    let (access, build) = (session.access.clone(), session.build.clone());
-    let build = move || {
-        let mut app = build();
-        app.insert_resource(access.clone());
-        app.add_plugins(PanelsPlugin::desktop()).insert_resource(Exporter(Arc::new(write_exr)));
-        app
-    };
+    let build = builder(session, PanelsPlugin::desktop());
     crate::desktop::run_app(build, args.scene.clone())
         .map_err(|e| Failure::Internal(format!("the window failed: {e:#}")))?;
     Ok(Outcome::Done)
+}
+
+/// Refuses what is neither a file nor a bundled scene.
+#[cfg(feature = "desktop")]
+pub(super) fn exists(scene: &Path) -> Result<(), Failure> {
+    if scene.exists() || intrados_scene::bundled().iter().any(|(n, _)| Path::new(n) == stem(scene))
+    {
+        return Ok(());
+    }
+    Err(Failure::NoInput(format!(
+        "{}: there is no such file or bundled scene: check the path",
+        scene.display()
+    )))
+}
+
+/// What makes the window's app.
+#[cfg(feature = "desktop")]
+pub(super) fn builder(session: &Session, panels: PanelsPlugin) -> impl Fn() -> App + 'static {
+    let (access, build) = (session.access.clone(), session.build.clone());
+    move || {
+        let mut app = build();
+        app.insert_resource(access.clone());
+        app.add_plugins(panels.clone()).insert_resource(Exporter(Arc::new(write_exr)));
+        app
+    }
 }
 
 /// The picture of the window as EXR, as `intrados render` writes it.

@@ -5,17 +5,25 @@ use std::path::PathBuf;
 use bevy_ecs::prelude::*;
 use intrados_light::{RenderSettings, View};
 use intrados_predict::Progress;
-use intrados_scene::plugin::{CurrentScene, OpenScene};
+use intrados_scene::{
+    attach::Attachment,
+    plugin::{CurrentScene, OpenScene},
+};
 
 use crate::{
-    Banners, Log, Look, Place, Quantity, Refine, Selection, Viewpoint,
+    Banners, Log, Look, Quantity, Refine, Selection, Viewpoint, Workspace,
+    attach::Form,
+    command::Palette,
     ct::Ct,
     dialog::{Dialogs, Purpose},
+    edits::{self, Edit},
     export::Export,
     layout::Layout,
     photos::Photos,
-    place::Panels,
     recent::Recent,
+    saving::{Saving, Taken},
+    structure::{self, Structure},
+    workspace::Desk,
 };
 
 /// Something that a user can ask for by a button, a menu, or a key.
@@ -50,20 +58,56 @@ pub enum Action {
     ShowQuantity(Quantity),
     /// Select a member, or nothing.
     Select(Option<usize>),
-    /// Go to a tab in the centre, by its name.
+    /// Select the next member of the list, or the one before.
+    Step(bool),
+    /// Bring a panel to the front, by its name; it is opened where it was closed.
     Tab(&'static str),
+    /// Open a panel, or close it.
+    Panel(String, bool),
+    /// Go to a layout.
+    Arrange(Workspace),
+    /// Go to the other layout.
+    SwapWorkspace,
+    /// Lay the panels out as at first.
+    ResetLayout,
+    /// Light, dark, or as the system has it.
+    Theme(egui::ThemePreference),
+    /// Fill the screen, or no more.
+    Fullscreen,
+    /// Close the window.
+    Quit,
     /// Show a slice of the selected member, by its place among those of the scene, in the CT tab.
     Slice(usize),
     /// Look at a photograph in the Photos tab.
     Photograph(PathBuf),
     /// Choose a photograph in a dialog.
     ChoosePhotograph,
+    /// Fill in what is attached to the selected member, with files that were given already.
+    Fill(Vec<PathBuf>),
+    /// Choose files for that form in a dialog.
+    ChooseEvidence,
+    /// Attach evidence, as `intrados attach` does.
+    Attach(Box<Attachment>),
+    /// Detach evidence, as `intrados detach` does: from the member of this id what has this name.
+    Detach(String, String),
+    /// Take the last change of the evidence back.
+    Undo,
+    /// Make the last change that was taken back again.
+    Redo,
     /// Ask for a file name to export to.
     Export,
     /// Choose that file name in a dialog.
     ChooseExport,
+    /// Ask where to save something.
+    Save(Taken),
+    /// Choose that place in a dialog.
+    ChooseSave,
+    /// Write the window as it is seen, or one panel of it, as PNG.
+    TakePicture(PathBuf, Option<String>),
     /// Show or hide the list of keys.
     Keys,
+    /// Show or hide the list of all commands.
+    Palette,
     /// Put away whatever is on top: a sheet, a banner, the selection.
     Dismiss,
 }
@@ -105,6 +149,25 @@ fn carry_out(world: &mut World, action: Action) {
             let name = world.resource::<Export>().path.clone();
             Dialogs::open(world, Purpose::Save(name));
         }
+        Action::Save(what) => {
+            let scene = world.get_resource::<CurrentScene>().map(|s| s.0.name.clone());
+            if let Some(scene) = scene {
+                world.resource_mut::<Saving>().ask(what, &scene);
+            }
+        }
+        Action::ChooseSave => {
+            let name = world.resource::<Saving>().proposal();
+            Dialogs::open(world, Purpose::Take(name));
+        }
+        Action::TakePicture(path, panel) => {
+            let of = panel.map(|panel| world.resource::<Desk>().place(&panel));
+            match of {
+                Some(None) => world
+                    .resource_mut::<Banners>()
+                    .cannot("No picture", "this panel is not in sight: bring it to the front"),
+                of => world.resource_mut::<Saving>().take_picture(path, of.flatten()),
+            }
+        }
         Action::Open(path) => open(world, path),
         Action::Reload => {
             if let Some(path) = world.resource::<Layout>().asked.clone() {
@@ -128,6 +191,7 @@ fn carry_out(world: &mut World, action: Action) {
             world.resource_mut::<RenderSettings>().set_changed();
         }
         Action::Home => {
+            world.resource_mut::<Structure>().look(structure::View::Home);
             let home = world.resource::<Viewpoint>().home.clone();
             if let Some(home) = home {
                 world.resource_mut::<Viewpoint>().go(home);
@@ -146,7 +210,20 @@ fn carry_out(world: &mut World, action: Action) {
         Action::Select(member) => {
             world.resource_mut::<Selection>().set_if_neq(Selection(member));
         }
+        Action::Step(forward) => step(world, forward),
         Action::Tab(name) => show_tab(world, name),
+        Action::Panel(name, true) => show_tab(world, &name),
+        Action::Panel(name, false) => world.resource_mut::<Desk>().close(&name),
+        Action::Arrange(workspace) => world.resource_mut::<Desk>().choose(workspace),
+        Action::SwapWorkspace => {
+            let mut desk = world.resource_mut::<Desk>();
+            let other = desk.shown().other();
+            desk.choose(other);
+        }
+        Action::ResetLayout => world.resource_mut::<Desk>().reset(),
+        Action::Theme(theme) => world.resource_mut::<Desk>().dress(theme),
+        Action::Fullscreen => world.resource_mut::<Layout>().toggle_fullscreen(),
+        Action::Quit => world.resource_mut::<Layout>().quits = true,
         Action::Slice(index) => {
             world.resource_mut::<Ct>().show(index);
             show_tab(world, "CT");
@@ -156,6 +233,12 @@ fn carry_out(world: &mut World, action: Action) {
             show_tab(world, "Photos");
         }
         Action::ChoosePhotograph => Dialogs::open(world, Purpose::Photograph),
+        Action::ChooseEvidence => Dialogs::open(world, Purpose::Evidence),
+        Action::Fill(files) => fill(world, files),
+        Action::Attach(what) => edits::begin(world, Edit::Attach(what)),
+        Action::Detach(member, name) => edits::begin(world, Edit::Detach { member, name }),
+        Action::Undo => edits::begin(world, Edit::Undo),
+        Action::Redo => edits::begin(world, Edit::Redo),
         Action::Export => {
             let name =
                 world.get_resource::<CurrentScene>().map(|s| s.0.name.clone()).unwrap_or_default();
@@ -165,8 +248,37 @@ fn carry_out(world: &mut World, action: Action) {
             let mut layout = world.resource_mut::<Layout>();
             layout.keys = !layout.keys;
         }
+        Action::Palette => world.resource_mut::<Palette>().toggle(),
         Action::Dismiss => dismiss(world),
     }
+}
+
+/// Opens the form of evidence for the selected member.
+fn fill(world: &mut World, files: Vec<PathBuf>) {
+    let selected = world.resource::<Selection>().0;
+    let scene = world.get_resource::<CurrentScene>().map(|s| s.0.clone());
+    let member = scene.as_ref().and_then(|s| s.members.get(selected?));
+    match member {
+        Some(member) => world.resource_mut::<Form>().begin(&member.id, files),
+        None => world
+            .resource_mut::<Banners>()
+            .cannot("Attached to which member?", "select one first, in the picture or in the list"),
+    }
+}
+
+/// Selects the next member, or the one before; around at the ends.
+fn step(world: &mut World, forward: bool) {
+    let count = world.get_resource::<CurrentScene>().map_or(0, |s| s.0.members.len());
+    if count == 0 {
+        return;
+    }
+    let next = match (world.resource::<Selection>().0, forward) {
+        (Some(i), true) => (i + 1) % count,
+        (Some(i), false) => (i + count - 1) % count,
+        (None, true) => 0,
+        (None, false) => count - 1,
+    };
+    world.resource_mut::<Selection>().set_if_neq(Selection(Some(next)));
 }
 
 fn open(world: &mut World, path: PathBuf) {
@@ -177,18 +289,11 @@ fn open(world: &mut World, path: PathBuf) {
 }
 
 fn show_tab(world: &mut World, name: &str) {
-    let tab = world
-        .resource::<Panels>()
-        .0
-        .iter()
-        .filter(|p| p.place == Place::Tab)
-        .position(|p| p.name == name);
-    if let Some(tab) = tab {
-        world.resource_mut::<Layout>().tab = tab;
-    }
+    world.resource_mut::<Desk>().open(name);
 }
 
 fn frame(world: &mut World) {
+    world.resource_mut::<Structure>().look(structure::View::Framed);
     let Some(scene) = world.get_resource::<CurrentScene>().map(|s| s.0.clone()) else { return };
     let selected = world.resource::<Selection>().0.and_then(|i| scene.members.get(i));
     let bounds = selected.map_or_else(|| scene.bounds(), |member| member.bounds);
@@ -203,7 +308,9 @@ fn dismiss(world: &mut World) {
     if std::mem::take(&mut export.shown) {
         return;
     }
-    if std::mem::take(&mut world.resource_mut::<Layout>().keys)
+    if world.resource_mut::<Saving>().dismiss()
+        || std::mem::take(&mut world.resource_mut::<Form>().is_open)
+        || std::mem::take(&mut world.resource_mut::<Layout>().keys)
         || world.resource_mut::<Banners>().dismiss()
     {
         return;

@@ -1,7 +1,10 @@
 //! Colours that mean something. None of them is the only carrier of what it means.
 
-use egui::Color32;
+use std::sync::LazyLock;
+
+use egui::{Color32, ecolor::gamma_u8_from_linear_f32 as srgb};
 use intrados_damage::verdict::{Basis, Verdict};
+use intrados_report::surface;
 
 /// Primal: blue of Okabe & Ito's palette, told apart from vermilion by every kind of colour vision.
 pub(crate) const PRIMAL: Color32 = Color32::from_rgb(0, 114, 178);
@@ -14,16 +17,33 @@ pub(crate) const SELECTED: Color32 = Color32::from_rgb(255, 176, 0);
 /// No value here.
 pub(crate) const UNKNOWN: Color32 = Color32::from_gray(96);
 
-/// Share of grey in the colour of what is only forecast.
-pub(crate) const PALER: f32 = intrados_report::surface::PALER;
+/// Steps of the scale of damage.
+const STEPS: usize = 255;
 
-/// The same colour, paler: of what is only forecast.
-pub(crate) fn paler([r, g, b]: [u8; 3]) -> [u8; 3] {
-    lerp(Color32::from_rgb(r, g, b), UNKNOWN, PALER)
-        .to_array()
-        .first_chunk()
-        .copied()
-        .unwrap_or([r, g, b])
+/// The report's scale, measured and forecast, as sRGB: asked for by every pixel.
+static SCALE: LazyLock<[Vec<[u8; 3]>; 2]> = LazyLock::new(|| {
+    let step = |k: usize| Some(k as f64 / STEPS as f64);
+    let bytes = |linear: glam::Vec3| linear.to_array().map(srgb);
+    [
+        (0..=STEPS).map(|k| bytes(surface::colour(step(k)))).collect(),
+        (0..=STEPS).map(|k| bytes(surface::forecast(step(k)))).collect(),
+    ]
+});
+
+/// The colour of a damage, everywhere in the window and as in the report: paler where it is only
+/// forecast, grey where it is not a number.
+pub(crate) fn damage(value: f32, is_forecast: bool) -> [u8; 3] {
+    if value.is_nan() {
+        return surface::UNKNOWN.to_array().map(srgb);
+    }
+    let step = (value.clamp(0.0, 1.0) * STEPS as f32).round() as usize;
+    SCALE[usize::from(is_forecast)].get(step).copied().unwrap_or_default()
+}
+
+/// The same for a brush.
+pub(crate) fn damage_ink(value: f32, is_forecast: bool) -> Color32 {
+    let [r, g, b] = damage(value, is_forecast);
+    Color32::from_rgb(r, g, b)
 }
 
 /// Steps of severity drawn as squares: their number says it, the colour only helps. Filled up to

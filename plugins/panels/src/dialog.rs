@@ -8,13 +8,21 @@ use std::{
 use bevy_ecs::prelude::*;
 use intrados_stage::{Jobs, Task};
 
-use crate::{Action, Actions, Banners, Log, export::Export};
+use crate::{
+    Action, Actions, Banners, Log,
+    attach::{self, Form},
+    export::Export,
+    saving::Saving,
+};
 
 /// A dialog that is gone sooner than anybody can click was never there.
 const TOO_SOON: Duration = Duration::from_millis(400);
 
 /// What photographs end in.
 const PHOTOGRAPHS: &[&str] = &["jpg", "jpeg", "png", "tif", "tiff"];
+
+/// What slices and tables end in.
+const EVIDENCE: &[&str] = &["csv", "tsv", "txt", "tif", "tiff", "png", "mha", "dcm"];
 
 /// Whether a file is a photograph, by its name; those too that are refused with a remedy.
 pub(crate) fn is_photograph(path: &Path) -> bool {
@@ -27,8 +35,12 @@ pub(crate) fn is_photograph(path: &Path) -> bool {
 pub(crate) enum Purpose {
     Open,
     Photograph,
+    /// Slices or a table.
+    Evidence,
     /// With a proposal.
     Save(String),
+    /// The same of what is no picture of light.
+    Take(String),
 }
 
 /// The dialog that is open, if one is.
@@ -36,7 +48,7 @@ pub(crate) enum Purpose {
 pub(crate) struct Dialogs {
     /// Whether there may be any.
     allowed: bool,
-    open: Option<(Purpose, Instant, Task<Option<PathBuf>>)>,
+    open: Option<(Purpose, Instant, Task<Vec<PathBuf>>)>,
 }
 
 impl Dialogs {
@@ -58,12 +70,23 @@ impl Dialogs {
         // Not in the list of jobs: it waits for the user, not the other way round.
         let task =
             Task::spawn_unlisted(&mut world.resource_mut::<Jobs>(), "file dialog", move |_| {
-                match theirs {
+                let chosen = match theirs {
+                    Purpose::Evidence => {
+                        return rfd::FileDialog::new()
+                            .set_title("Attach CT slices or a table")
+                            .add_filter("Slices and tables", EVIDENCE)
+                            .add_filter("All files", &["*"])
+                            .pick_files()
+                            .unwrap_or_default();
+                    }
                     Purpose::Open => rfd::FileDialog::new()
                         .set_title("Open a scene")
                         .add_filter("Scenes and models", &["ron", "glb", "gltf", "ifc"])
                         .add_filter("All files", &["*"])
                         .pick_file(),
+                    Purpose::Take(name) => {
+                        rfd::FileDialog::new().set_title("Save").set_file_name(name).save_file()
+                    }
                     Purpose::Photograph => rfd::FileDialog::new()
                         .set_title("Open a photograph")
                         .add_filter("Photographs", PHOTOGRAPHS)
@@ -75,7 +98,8 @@ impl Dialogs {
                         .add_filter("EXR, with all data", &["exr"])
                         .set_file_name(name)
                         .save_file(),
-                }
+                };
+                chosen.into_iter().collect()
             });
         world.resource_mut::<Self>().open = Some((purpose, Instant::now(), task));
     }
@@ -106,8 +130,9 @@ fn is_missing(purpose: &Purpose, banners: &mut Banners, log: &mut Log) {
         Purpose::Open => {
             "start with `intrados view FILE`, drop the file on the window, or type its path on the start screen"
         }
+        Purpose::Evidence => "drop the files on the window, or type their path",
         Purpose::Photograph => "drop the photograph on the window, or type its path",
-        Purpose::Save(_) => "type the file's name instead",
+        Purpose::Save(_) | Purpose::Take(_) => "type the file's name instead",
     };
     log.say(format!("no file dialog on this system: {instead}"));
     banners.cannot("No file dialog on this system", instead);
@@ -118,19 +143,28 @@ pub(crate) fn take(
     mut dialogs: ResMut<Dialogs>,
     mut actions: ResMut<Actions>,
     mut export: ResMut<Export>,
+    mut form: ResMut<Form>,
+    mut saving: ResMut<Saving>,
     mut banners: ResMut<Banners>,
     mut log: ResMut<Log>,
 ) {
     let Some((purpose, since, task)) = &dialogs.open else { return };
     let Some(chosen) = task.poll() else { return };
-    match (purpose, chosen.ok().flatten()) {
+    let mut chosen = chosen.unwrap_or_default();
+    if matches!(purpose, Purpose::Evidence) && !chosen.is_empty() {
+        attach::add(&mut form, chosen);
+        dialogs.open = None;
+        return;
+    }
+    match (purpose, chosen.pop()) {
         (Purpose::Open, Some(path)) => actions.ask(Action::Open(path)),
         (Purpose::Photograph, Some(path)) => actions.ask(Action::Photograph(path)),
+        (Purpose::Take(_), Some(path)) => saving.put(&path),
         (Purpose::Save(_), Some(path)) => export.path = path.display().to_string(),
         (purpose, None) if since.elapsed() < TOO_SOON => {
             is_missing(purpose, &mut banners, &mut log)
         }
-        (_, None) => {}
+        (Purpose::Evidence, Some(_)) | (_, None) => {}
     }
     dialogs.open = None;
 }

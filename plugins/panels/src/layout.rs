@@ -6,7 +6,7 @@ use bevy_ecs::{
     prelude::*,
     system::{IntoSystem, RegisteredSystemError, SystemId},
 };
-use egui::{CentralPanel, CollapsingHeader, Panel as Side, ScrollArea, Ui};
+use egui::{CentralPanel, Panel as Side, Ui};
 use intrados_light::{
     Measurement, Render,
     plugin::{Learning, Upcoming},
@@ -14,26 +14,32 @@ use intrados_light::{
 use intrados_predict::Progress;
 use intrados_scene::{
     LoadError,
+    attach::What,
     plugin::{CurrentScene, SceneChanged, SceneFailed},
 };
 use intrados_stage::{Jobs, Pace, catch};
 
 use crate::{
-    Action, Actions, Banners, Log, Look, Place, Selection, banner,
+    Action, Actions, Banners, Latest, Log, Look, Selection, Workspace,
+    attach::{self, Form},
+    banner, command,
     ct::Ct,
     dialog::{self, Dialogs},
+    edits::Edits,
     export::{self, Export},
     fields::Fields,
     log,
     outline::Outline,
     photos::Photos,
     picture::Picture,
-    place::{Panel, Panels},
+    place::Panels,
     recent::Recent,
-    render,
     report::Report,
+    saving::{self, Saving},
     start,
     stress::Stress,
+    toast,
+    workspace::{self, Desk},
 };
 
 /// What is open.
@@ -45,10 +51,35 @@ pub(crate) struct Layout {
     pub(crate) keys: bool,
     /// What was last asked to be opened.
     pub(crate) asked: Option<PathBuf>,
-    pub(crate) tab: usize,
-    bottom: usize,
+    /// The window is to be closed.
+    pub(crate) quits: bool,
+    /// Whether the window fills the screen, and whether it is told so already.
+    fullscreen: (bool, bool),
     /// Systems that draw what is no panel.
-    own: Option<[SystemId<InMut<'static, Ui>>; 2]>,
+    own: Option<[SystemId<InMut<'static, Ui>>; 4]>,
+}
+
+impl Layout {
+    pub(crate) fn toggle_fullscreen(&mut self) {
+        self.fullscreen = (!self.fullscreen.0, false);
+    }
+
+    /// Tells the window what was asked for.
+    fn tell(&mut self, ui: &Ui) {
+        if std::mem::take(&mut self.quits) {
+            ui.ctx().send_viewport_cmd(egui::ViewportCommand::Close);
+        }
+        if !std::mem::replace(&mut self.fullscreen.1, true) {
+            ui.ctx().send_viewport_cmd(egui::ViewportCommand::Fullscreen(self.fullscreen.0));
+        }
+    }
+}
+
+/// The scene that is open, and ids of its members.
+#[derive(Default)]
+pub(crate) struct Open {
+    path: PathBuf,
+    members: Vec<String>,
 }
 
 /// Says what has become of a load.
@@ -57,6 +88,8 @@ pub(crate) fn greet(
     mut failed: MessageReader<SceneFailed>,
     scene: Option<Res<CurrentScene>>,
     mut layout: ResMut<Layout>,
+    mut desk: ResMut<Desk>,
+    mut open: Local<Open>,
     mut selection: ResMut<Selection>,
     mut recent: ResMut<Recent>,
     mut banners: ResMut<Banners>,
@@ -73,8 +106,19 @@ pub(crate) fn greet(
     let (Some(_), Some(scene)) = (changed.read().last(), scene) else { return };
     layout.start = false;
     banners.clear();
-    selection.0 = None;
     let scene = &scene.0;
+    desk.adapt(!scene.members.is_empty());
+    // Of the same file with other evidence, the same member stays selected.
+    let same = Some(&scene.path).filter(|path| path.exists() && **path == open.path);
+    let member = selection.0.filter(|_| same.is_some()).and_then(|i| open.members.get(i));
+    selection.0 = member.and_then(|id| scene.members.iter().position(|m| m.id == *id));
+    if same.is_none() && desk.shown() == Workspace::Inspector {
+        desk.open("Structure");
+    }
+    *open = Open {
+        path: scene.path.clone(),
+        members: scene.members.iter().map(|m| m.id.clone()).collect(),
+    };
     if scene.path.exists() {
         recent.remember(&scene.path);
     }
@@ -113,31 +157,50 @@ pub fn is_busy(world: &mut World) -> bool {
         || world.resource::<Photos>().is_busy()
         || world.resource::<Stress>().is_busy()
         || world.resource::<Export>().is_busy()
+        || world.resource::<Edits>().is_busy()
+        || world.resource::<Saving>().is_busy()
         || world.resource::<Report>().is_busy()
 }
 
 /// Draws the whole window.
 pub fn show(ui: &mut Ui, world: &mut World) {
-    let dropped = ui.input(|i| i.raw.dropped_files.iter().map(|f| f.path().to_owned()).next_back());
-    if let Some(path) = dropped {
-        let is_photograph =
-            dialog::is_photograph(&path) && world.contains_resource::<CurrentScene>();
-        let action = if is_photograph { Action::Photograph(path) } else { Action::Open(path) };
-        world.resource_mut::<Actions>().ask(action);
-    }
-    let look = *world.resource::<Look>();
-    render::keys(ui, &look, &mut world.resource_mut::<Actions>());
-    let [start, sheet] = own(world);
+    drops(ui, world);
+    world.resource_mut::<Layout>().bypass_change_detection().tell(ui);
+    workspace::dress(ui, world);
+    // Before the keys: while it is open, it takes them.
+    command::palette(ui, world);
+    command::keys(ui, world);
+    let [start, sheet, form, saving] = own(world);
     banner::show(ui, world);
     if world.contains_resource::<CurrentScene>() && !world.resource::<Layout>().start {
         panels(ui, world);
     } else {
         CentralPanel::default().show(ui, |ui| run(world, start, "start screen", ui));
     }
-    sheets(ui, world, sheet);
+    sheets(ui, world, [sheet, form, saving]);
+    saving::picture(ui, world);
+    toast::show(ui, world);
     if ui.input(|i| !i.raw.hovered_files.is_empty()) {
         drop_here(ui);
     }
+}
+
+/// What was let go over the window: evidence belongs to the selected member, a photograph is placed
+/// first, a model is opened.
+fn drops(ui: &Ui, world: &mut World) {
+    let dropped: Vec<PathBuf> =
+        ui.input(|i| i.raw.dropped_files.iter().map(|f| f.path().to_owned()).collect());
+    let Some(last) = dropped.last() else { return };
+    let is_open = world.contains_resource::<CurrentScene>();
+    let has_member = world.resource::<Selection>().0.is_some();
+    let evidence: Option<Vec<Vec<PathBuf>>> = dropped.iter().map(|p| attach::evidence(p)).collect();
+    let is_table = What::is_table(last) == Some(true);
+    let action = match evidence {
+        Some(files) if is_open && (has_member || is_table) => Action::Fill(files.concat()),
+        _ if is_open && dialog::is_photograph(last) => Action::Photograph(last.clone()),
+        _ => Action::Open(last.clone()),
+    };
+    world.resource_mut::<Actions>().ask(action);
 }
 
 /// While a file hangs over the window.
@@ -156,13 +219,15 @@ fn drop_here(ui: &Ui) {
     );
 }
 
-fn own(world: &mut World) -> [SystemId<InMut<'static, Ui>>; 2] {
+fn own(world: &mut World) -> [SystemId<InMut<'static, Ui>>; 4] {
     if let Some(own) = world.resource::<Layout>().own {
         return own;
     }
     let own = [
         world.register_system(IntoSystem::into_system(start::start)),
         world.register_system(IntoSystem::into_system(export::sheet)),
+        world.register_system(IntoSystem::into_system(attach::form)),
+        world.register_system(IntoSystem::into_system(saving::sheet)),
     ];
     world.resource_mut::<Layout>().own = Some(own);
     own
@@ -195,58 +260,34 @@ fn run(world: &mut World, system: SystemId<InMut<'static, Ui>>, name: &str, ui: 
 }
 
 fn panels(ui: &mut Ui, world: &mut World) {
-    let all = world.resource::<Panels>().0.clone();
-    let at =
-        |place: Place| all.iter().filter(|p| p.place == place).cloned().collect::<Vec<Panel>>();
     Side::top("menu").show(ui, |ui| menu(ui, world));
-    let tabs = at(Place::Bottom);
-    Side::bottom("bottom").resizable(true).default_size(200.0).min_size(80.0).show(ui, |ui| {
-        let mut open = world.resource::<Layout>().bottom.min(tabs.len().saturating_sub(1));
-        tab_row(ui, &tabs, &mut open);
-        world.resource_mut::<Layout>().bottom = open;
-        // A panel would shrink to what is in it.
-        ui.set_min_size(ui.available_size());
-        if let Some(tab) = tabs.get(open) {
-            run(world, tab.system, &tab.name, ui);
-        }
-    });
-    Side::left("left")
-        .resizable(true)
-        .default_size(260.0)
-        .show(ui, |ui| stack(ui, world, &at(Place::Left)));
-    Side::right("right")
-        .resizable(true)
-        .default_size(280.0)
-        .show(ui, |ui| stack(ui, world, &at(Place::Right)));
-    let tabs = at(Place::Tab);
-    CentralPanel::default().show(ui, |ui| {
-        let mut open = world.resource::<Layout>().tab.min(tabs.len().saturating_sub(1));
-        tab_row(ui, &tabs, &mut open);
-        world.resource_mut::<Layout>().tab = open;
-        if let Some(tab) = tabs.get(open) {
-            run(world, tab.system, &tab.name, ui);
-        }
+    Side::bottom("status").exact_size(24.0).show(ui, |ui| status(ui, world));
+    CentralPanel::default().frame(egui::Frame::NONE).show(ui, |ui| {
+        workspace::show(ui, world, &mut |panel, ui, world| {
+            run(world, panel.system, &panel.name, ui);
+        });
     });
 }
 
-fn tab_row(ui: &mut Ui, tabs: &[Panel], open: &mut usize) {
-    ui.horizontal(|ui| {
-        for (i, tab) in tabs.iter().enumerate() {
-            ui.selectable_value(open, i, &tab.name);
+/// What is going on: jobs, each with its progress and a way to stop it, and what was said last.
+fn status(ui: &mut Ui, world: &mut World) {
+    ui.horizontal_centered(|ui| {
+        let mut jobs = world.resource_mut::<Jobs>();
+        let jobs = jobs.bypass_change_detection();
+        let count = jobs.running().len();
+        if count > 0 {
+            log::first(ui, jobs);
         }
-    });
-    ui.separator();
-}
-
-/// Panels under each other, each under its name.
-fn stack(ui: &mut Ui, world: &mut World, panels: &[Panel]) {
-    ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-        for panel in panels {
-            CollapsingHeader::new(&panel.name)
-                .id_salt(&panel.name)
-                .default_open(true)
-                .show_unindented(ui, |ui| run(world, panel.system, &panel.name, ui));
-            ui.add_space(4.0);
+        if count > 1 {
+            ui.menu_button(format!("and {} more", count - 1), |ui| log::list(ui, jobs));
+        }
+        // What a banner says, or has said until it was put away, need not be said twice.
+        if count == 0
+            && world.resource::<Banners>().lines().is_empty()
+            && let Some(line) = world.resource::<Log>().lines().last()
+            && !line.starts_with('⚠')
+        {
+            ui.add(egui::Label::new(egui::RichText::new(line).weak()).truncate());
         }
     });
 }
@@ -278,6 +319,19 @@ fn menu(ui: &mut Ui, world: &mut World) {
                 ui.ctx().send_viewport_cmd(egui::ViewportCommand::Close);
             }
         });
+        ui.menu_button("Save…", |ui| {
+            let latest = world.resource::<Latest>();
+            let has = scene.as_ref().is_some_and(|s| latest.result_for(s).is_some());
+            saving::menu(ui, has, &mut asked);
+        });
+        ui.menu_button("Edit", |ui| {
+            for (name, keys, may, action) in edits(world, scene.is_some()) {
+                let button = egui::Button::new(name).shortcut_text(keys);
+                if ui.add_enabled(may, button).clicked() {
+                    asked.push(action);
+                }
+            }
+        });
         ui.menu_button("View", |ui| {
             for (name, keys, action) in [
                 ("Fit into the picture", "F", Action::Frame),
@@ -301,8 +355,13 @@ fn menu(ui: &mut Ui, world: &mut World) {
             let mut look = *world.resource::<Look>();
             ui.checkbox(&mut look.outline, "Outline the selected member");
             world.resource_mut::<Look>().set_if_neq(look);
+            ui.separator();
+            arrangement(ui, world, &mut asked);
         });
-        if ui.button("Keys").on_hover_text("?").clicked() {
+        if ui.button("Commands").on_hover_text("Ctrl+P").clicked() {
+            asked.push(Action::Palette);
+        }
+        if ui.button("Keys").on_hover_text("F1 or ?").clicked() {
             asked.push(Action::Keys);
         }
         if let Some(scene) = scene {
@@ -312,33 +371,93 @@ fn menu(ui: &mut Ui, world: &mut World) {
                     ui.label(format!("⚠ {}", scene.warnings.len()))
                         .on_hover_text(scene.warnings.join("\n"));
                 }
-                log::list(ui, world.resource_mut::<Jobs>().bypass_change_detection());
+                let expert = command::is_expert(world);
+                let hint = "Estimators, light meters, fields and convergence (F9)";
+                if ui.selectable_label(expert, "Expert").on_hover_text(hint).clicked() {
+                    asked.push(Action::SwapWorkspace);
+                }
             });
         }
     });
     asked.into_iter().for_each(|action| world.resource_mut::<Actions>().ask(action));
 }
 
+/// What can be done to the evidence.
+fn edits(world: &World, is_open: bool) -> [(String, &'static str, bool, Action); 3] {
+    let has_member = is_open && world.resource::<Selection>().0.is_some();
+    let edits = world.resource::<Edits>();
+    let is_free = !edits.is_busy();
+    let [undo, redo] = edits.next();
+    let named = |word: &str, what: Option<&str>| match what {
+        Some(what) => format!("{word}: {what}"),
+        None => word.to_owned(),
+    };
+    [
+        (named("Undo", undo), "Ctrl+Z", is_free && undo.is_some(), Action::Undo),
+        (named("Redo", redo), "Ctrl+Shift+Z", is_free && redo.is_some(), Action::Redo),
+        ("Attach evidence…".into(), "A", has_member, Action::Fill(Vec::new())),
+    ]
+}
+
+/// Layouts, panels and themes.
+fn arrangement(ui: &mut Ui, world: &World, asked: &mut Vec<Action>) {
+    let desk = world.resource::<Desk>();
+    for workspace in Workspace::BOTH {
+        let name = format!("{}'s layout", workspace.name());
+        if ui.radio(desk.shown() == workspace, name).on_hover_text("F9").clicked() {
+            asked.push(Action::Arrange(workspace));
+        }
+    }
+    ui.menu_button("Panels", |ui| {
+        for panel in &world.resource::<Panels>().0 {
+            let mut is_open = desk.is_open(&panel.name);
+            if ui.checkbox(&mut is_open, &panel.name).clicked() {
+                asked.push(Action::Panel(panel.name.clone(), is_open));
+            }
+        }
+    });
+    if ui.button("Panels as at first").clicked() {
+        asked.push(Action::ResetLayout);
+    }
+    ui.separator();
+    use egui::ThemePreference::{Dark, Light, System};
+    for (theme, name) in [(System, "As the system"), (Light, "Light theme"), (Dark, "Dark theme")] {
+        if ui.radio(desk.theme() == theme, name).clicked() {
+            asked.push(Action::Theme(theme));
+        }
+    }
+}
+
 /// What lies on top.
-fn sheets(ui: &mut Ui, world: &mut World, sheet: SystemId<InMut<'static, Ui>>) {
+fn sheets(
+    ui: &mut Ui,
+    world: &mut World,
+    [sheet, form, saving]: [SystemId<InMut<'static, Ui>>; 3],
+) {
     let centred = |title: &str| {
         egui::Window::new(title.to_owned())
             .collapsible(false)
             .resizable(false)
             .anchor(egui::Align2::CENTER_CENTER, [0.0, 0.0])
     };
-    let mut open = world.resource::<Layout>().keys;
+    command::sheet(ui, world);
+    let mut open = world.resource::<Form>().is_open;
     if open {
-        centred("Keys").open(&mut open).show(ui.ctx(), |ui| {
-            egui::Grid::new("keys").num_columns(2).striped(true).show(ui, |ui| {
-                for (keys, what) in render::KEYS {
-                    ui.strong(keys);
-                    ui.label(what);
-                    ui.end_row();
-                }
-            });
-        });
-        world.resource_mut::<Layout>().keys = open;
+        // It may be drawn aside, to see where on the member something is.
+        egui::Window::new("Attach evidence")
+            .open(&mut open)
+            .collapsible(false)
+            .resizable(false)
+            .default_pos(ui.ctx().content_rect().center() - egui::vec2(320.0, 300.0))
+            .show(ui.ctx(), |ui| run(world, form, "attach evidence", ui));
+        world.resource_mut::<Form>().is_open &= open;
+    }
+    let mut open = world.resource::<Saving>().is_shown();
+    if open {
+        centred("Save").open(&mut open).show(ui.ctx(), |ui| run(world, saving, "save", ui));
+        if !open {
+            world.resource_mut::<Saving>().dismiss();
+        }
     }
     let mut open = world.resource::<Export>().shown;
     if open {

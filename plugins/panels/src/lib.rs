@@ -1,13 +1,16 @@
 #![doc = include_str!("../README.md")]
 
 mod action;
+mod attach;
 mod banner;
 mod chart;
 mod colours;
+mod command;
 mod convergence;
 mod ct;
 mod dialog;
 mod directions;
+mod edits;
 mod export;
 mod fields;
 mod inspector;
@@ -27,13 +30,18 @@ mod recent;
 mod refine;
 mod render;
 mod report;
+mod saving;
+mod sheet;
 mod start;
 mod statistics;
 mod steering;
 mod stress;
+mod structure;
 mod surface;
+mod toast;
 mod viewpoint;
 mod window;
+mod workspace;
 mod zoom;
 
 pub use action::{Action, Actions};
@@ -47,6 +55,8 @@ pub use place::{AddPanel, Place, Selection};
 pub use plugin::PanelsPlugin;
 pub use prediction::Latest;
 pub use refine::Refine;
+pub use saving::Taken;
 pub use statistics::Statistics;
 pub use viewpoint::Viewpoint;
 pub use window::Window;
+pub use workspace::Workspace;

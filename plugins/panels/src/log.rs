@@ -2,7 +2,7 @@
 
 use bevy_ecs::prelude::*;
 use egui::{ProgressBar, ScrollArea, Ui};
-use intrados_stage::Jobs;
+use intrados_stage::{Job, Jobs};
 
 /// Lines kept.
 const LINES: usize = 500;
@@ -52,25 +52,28 @@ pub(crate) fn jobs(InMut(ui): InMut<Ui>, mut jobs: ResMut<Jobs>) {
 pub(crate) fn list(ui: &mut Ui, jobs: &mut Jobs) -> bool {
     let running = jobs.running();
     for (i, job) in running.iter().enumerate() {
-        ui.push_id(i, |ui| {
-            ui.horizontal(|ui| {
-                if job.is_cancelled() {
-                    ui.add(egui::Spinner::new());
-                    ui.weak(format!("{}: stopping", job.label()));
-                    return;
-                }
-                if ui
-                    .button("Cancel")
-                    .on_hover_text("Stops the work; nothing half done is left")
-                    .clicked()
-                {
-                    job.cancel();
-                }
-                let bar = ProgressBar::new(job.done()).desired_width(160.0).show_percentage();
-                ui.add(bar);
-                ui.label(job.label());
-            })
-        });
+        ui.push_id(i, |ui| ui.horizontal(|ui| row(ui, job)));
     }
     !running.is_empty()
+}
+
+/// The first of them alone, in a line that has begun.
+pub(crate) fn first(ui: &mut Ui, jobs: &mut Jobs) {
+    if let Some(job) = jobs.running().first() {
+        row(ui, job);
+    }
+}
+
+fn row(ui: &mut Ui, job: &Job) {
+    if job.is_cancelled() {
+        ui.add(egui::Spinner::new());
+        ui.weak(format!("{}: stopping", job.label()));
+        return;
+    }
+    let hint = "Stops the work; nothing half done is left";
+    if ui.button("Cancel").on_hover_text(hint).clicked() {
+        job.cancel();
+    }
+    ui.add(ProgressBar::new(job.done()).desired_width(160.0).show_percentage());
+    ui.label(job.label());
 }

@@ -35,6 +35,16 @@ pub fn plus_minus(mean: f64, error: f64, unit: &str) -> String {
     format!("({m:.d$} ± {e:.d$})e{exponent} {unit}")
 }
 
+/// A value that a click puts on the clipboard, with its unit and its error.
+pub(crate) fn copied(ui: &mut egui::Ui, text: egui::RichText) -> egui::Response {
+    let plain = text.text().to_owned();
+    let label = ui.add(egui::Label::new(text).sense(egui::Sense::click()));
+    if label.clicked() {
+        ui.ctx().copy_text(plain);
+    }
+    label.on_hover_text("Click to copy").on_hover_cursor(egui::CursorIcon::Copy)
+}
+
 /// Decimals that show two digits of `error`.
 fn decimals(error: f64) -> usize {
     if error > 0.0 { (1.0 - error.log10().floor()).clamp(0.0, 9.0) as usize } else { 3 }

@@ -8,9 +8,10 @@ use intrados_stage::Stage;
 
 use crate::{
     Actions, AddPanel, Banners, Latest, Log, Look, Place, Refine, Selection, Statistics, Viewpoint,
-    action, banner, convergence, ct, dialog, directions, export, fields, inspector, layout, log,
-    members, meters, outline, photos, picture, place::Panels, prediction, recent, refine, render,
-    report, statistics, steering, stress, viewpoint,
+    action, attach, banner, command, convergence, ct, dialog, directions, edits, export, fields,
+    inspector, layout, log, members, meters, outline, photos, picture, place::Panels, prediction,
+    recent, refine, render, report, saving, sheet, statistics, steering, stress, structure, toast,
+    viewpoint, workspace,
 };
 
 /// Adds the window's state and the built-in panels. It opens no window: whoever has one calls
@@ -21,6 +22,8 @@ pub struct PanelsPlugin {
     pub slice: Option<Duration>,
     /// Where the list of recent files is kept; `None`: nowhere.
     pub recent: Option<PathBuf>,
+    /// Where it is kept how panels lie, and the theme; `None`: nowhere.
+    pub layout: Option<PathBuf>,
     /// Whether the system's file dialogs may be opened.
     pub dialogs: bool,
 }
@@ -30,8 +33,9 @@ impl PanelsPlugin {
     /// user's data folder.
     #[must_use]
     pub fn desktop() -> Self {
-        let recent = dirs::data_dir().map(|d| d.join("intrados").join("recent.json"));
-        Self { slice: Some(Duration::from_millis(8)), recent, dialogs: true }
+        let file = |name| dirs::data_dir().map(|d| d.join("intrados").join(name));
+        let (recent, layout) = (file("recent.json"), file("layout.json"));
+        Self { slice: Some(Duration::from_millis(8)), recent, layout, dialogs: true }
     }
 }
 
@@ -58,6 +62,14 @@ impl Plugin for PanelsPlugin {
             .init_resource::<stress::Stress>()
             .init_resource::<report::Report>()
             .init_resource::<layout::Layout>()
+            .init_resource::<command::Palette>()
+            .init_resource::<sheet::Listing>()
+            .init_resource::<attach::Form>()
+            .init_resource::<edits::Edits>()
+            .init_resource::<toast::Toasts>()
+            .init_resource::<saving::Saving>()
+            .init_resource::<structure::Structure>()
+            .insert_resource(workspace::Desk::read(self.layout.clone()))
             .insert_resource(intrados_light::plugin::Widening(stress::WIDENING))
             .insert_resource(Refine::new(self.slice))
             .insert_resource(recent::Recent::read(self.recent.clone()))
@@ -80,12 +92,15 @@ impl Plugin for PanelsPlugin {
                     export::take,
                     stress::take,
                     report::take,
+                    edits::take,
+                    saving::take,
                     banner::gather,
                 )
                     .chain()
                     .in_set(Stage::Present),
             );
         app.add_panel(Place::Left, "Members", members::members)
+            .add_panel(Place::Right, "Member", sheet::member)
             .add_panel(Place::Right, "Inspector", inspector::inspector)
             .add_panel(Place::Right, "Meters", meters::meters)
             .add_panel(Place::Right, "Directions", directions::directions)
@@ -93,6 +108,7 @@ impl Plugin for PanelsPlugin {
             .add_panel(Place::Bottom, "Steering", steering::steering)
             .add_panel(Place::Bottom, "Jobs", log::jobs)
             .add_panel(Place::Bottom, "Log", log::log)
+            .add_panel(Place::Tab, "Structure", structure::structure)
             .add_panel(Place::Tab, "Render", render::render)
             .add_panel(Place::Tab, "Photos", photos::photos)
             .add_panel(Place::Tab, "CT", ct::ct)

@@ -9,7 +9,7 @@ use intrados_light::{
 };
 use intrados_stage::Pace;
 
-use crate::{Look, Statistics, Viewpoint};
+use crate::{Look, Statistics, Viewpoint, Workspace, workspace::Desk};
 
 /// Pause, target error and time spent.
 #[derive(Resource, Debug, Clone)]
@@ -44,15 +44,19 @@ impl Refine {
 }
 
 /// Sets the [`Pace`] of this frame. Frames that sum up the whole film, or develop all of it, get
-/// one step only.
+/// one step only. Where an inspector works and nobody sees the picture, it rests, and the cores are
+/// the prediction's.
 pub(crate) fn share_frame(
     refine: Res<Refine>,
+    desk: Res<Desk>,
     statistics: Res<Statistics>,
     viewpoint: Res<Viewpoint>,
     look: Res<Look>,
     mut pace: ResMut<Pace>,
 ) {
-    let rest = refine.paused || !viewpoint.is_preview() && refine.is_there(&statistics);
+    let is_hidden = desk.shown() == Workspace::Inspector && !desk.has_drawn("Render");
+    let rest =
+        refine.paused || is_hidden || !viewpoint.is_preview() && refine.is_there(&statistics);
     let busy = !viewpoint.is_preview() && (statistics.is_due() || look.is_changed());
     let wanted = match refine.slice {
         _ if rest => Pace::Rest,

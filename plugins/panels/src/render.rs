@@ -1,7 +1,7 @@
 //! The picture, its tools, and the hand on the camera.
 
 use bevy_ecs::prelude::*;
-use egui::{Color32, Key, PointerButton, Pos2, Rect, Sense, Ui, pos2, vec2};
+use egui::{Color32, PointerButton, Pos2, Rect, Sense, Ui, pos2, vec2};
 use glam::Vec3;
 use intrados_light::{
     ORDERS, Render, Trust, View,
@@ -403,62 +403,4 @@ fn colour_scale(
     }
     let middle = pos2(bar.left() + bar.width() * 0.5, bar.bottom() + 16.0);
     painter.text(middle, egui::Align2::CENTER_TOP, caption, font, colour);
-}
-
-/// Keys that act anywhere in the window while no field has the focus.
-pub(crate) const KEYS: [(&str, &str); 15] = [
-    ("Ctrl+O", "open a file"),
-    ("Ctrl+E", "export the picture"),
-    ("Space", "pause or continue"),
-    ("R", "restart the picture"),
-    ("F", "fit the selected member, or everything, into the picture"),
-    ("Home", "the scene's own camera"),
-    ("1  2  3", "primal, dual, combined"),
-    ("E", "light or error"),
-    ("Esc", "put away a sheet or a message, or unselect"),
-    ("?  F1", "this list"),
-    ("Drag", "orbit"),
-    ("Shift+drag, middle or right drag", "pan"),
-    ("Wheel", "nearer, farther"),
-    ("Click", "select a member"),
-    ("Double-click in the tree", "look at a member"),
-];
-
-/// Puts what keys ask for into the actions.
-pub(crate) fn keys(ui: &Ui, look: &Look, actions: &mut Actions) {
-    if ui.ctx().memory(|m| m.focused().is_some()) {
-        return;
-    }
-    let quantity =
-        if look.quantity == Quantity::Error { Quantity::Radiance } else { Quantity::Error };
-    let asked = ui.input_mut(|i| {
-        let command = egui::Modifiers::COMMAND;
-        let mut asked = Vec::new();
-        for (key, action) in [(Key::O, Action::Choose), (Key::E, Action::Export)] {
-            if i.consume_key(command, key) {
-                asked.push(action);
-            }
-        }
-        if i.modifiers.any() && !i.modifiers.shift_only() {
-            return asked;
-        }
-        let plain = [
-            (Key::Space, Action::Pause),
-            (Key::R, Action::Restart),
-            (Key::F, Action::Frame),
-            (Key::Home, Action::Home),
-            (Key::Num1, Action::Show(View::Primal)),
-            (Key::Num2, Action::Show(View::Dual)),
-            (Key::Num3, Action::Show(View::Combined)),
-            (Key::E, Action::ShowQuantity(quantity)),
-            (Key::Escape, Action::Dismiss),
-            (Key::F1, Action::Keys),
-            (Key::Questionmark, Action::Keys),
-        ];
-        asked.extend(
-            plain.into_iter().filter(|(key, _)| i.key_pressed(*key)).map(|(_, action)| action),
-        );
-        asked
-    });
-    asked.into_iter().for_each(|action| actions.ask(action));
 }

@@ -29,6 +29,8 @@ pub(crate) struct Surface<'a> {
     pub(crate) faces: &'a [[u32; 4]],
     /// Whether the mesh is drawn over it.
     pub(crate) mesh: bool,
+    /// Towards the sun, under an open sky; none: light comes from the eye.
+    pub(crate) sun: Option<Vec3>,
 }
 
 /// A picture, and what is where in it.
@@ -41,6 +43,11 @@ pub(crate) struct Drawn {
 }
 
 impl Drawn {
+    /// Of every pixel the face; [`NOTHING`] where there is none.
+    pub(crate) fn faces(&self) -> &[u32] {
+        &self.faces
+    }
+
     /// The face at a share of the picture's width and height.
     pub(crate) fn face(&self, x: f32, y: f32) -> Option<u32> {
         let [w, h] = self.size;
@@ -88,7 +95,10 @@ pub(crate) fn draw(
         let at = corners.map(|c| surface.positions[c as usize]);
         let normal = (at[2] - at[0]).cross(at[3] - at[1]).normalize_or_zero();
         let towards = (camera.position - at[0]).normalize_or_zero();
-        let shade = EDGE_ON + (1.0 - EDGE_ON) * normal.dot(towards).abs();
+        let shade = match surface.sun {
+            None => EDGE_ON + (1.0 - EDGE_ON) * normal.dot(towards).abs(),
+            Some(sun) => daylight(normal * normal.dot(towards).signum(), sun),
+        };
         // Both halves begin with an edge of the face, go on along another, and return along the
         // diagonal.
         for [a, b, c] in [[0, 1, 2], [2, 3, 0]].map(|t| t.map(|k: usize| corners[k] as usize)) {
@@ -125,6 +135,11 @@ pub(crate) fn draw(
         of_band.iter().for_each(|t| fill(t, rows, w, band * BAND, line, &colour));
     });
     gather(&pixels, size, over)
+}
+
+/// How bright a face is under an open sky and a sun: what looks down or away keeps half.
+fn daylight(normal: Vec3, sun: Vec3) -> f32 {
+    0.5 + 0.16 * (0.5 + 0.5 * normal.y) + 0.34 * normal.dot(sun).max(0.0)
 }
 
 /// Fills what of a triangle lies in a band of rows.
@@ -281,6 +296,7 @@ mod tests {
             values: &values,
             faces: &[[0, 1, 2, 3], [4, 5, 6, 7]],
             mesh: false,
+            sun: None,
         };
         let drawn = draw(&camera(), [64, 64], 2, &surface, |v| [v as u8; 3]);
         assert_eq!(
@@ -309,6 +325,7 @@ mod tests {
             values: &[0.0; 4],
             faces: &[[0, 1, 2, 3]],
             mesh: true,
+            sun: None,
         };
         let drawn = draw(&camera(), [16, 16], 1, &surface, |_| [255; 3]);
         assert!(drawn.image.pixels.iter().all(|p| *p == Color32::TRANSPARENT));

@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 
+pub mod attaching;
 mod compared;
 mod defect;
 mod error;

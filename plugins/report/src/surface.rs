@@ -104,11 +104,14 @@ fn below(polygon: &[Vec3], along: &impl Fn(Vec3) -> f32, border: f32, side: f32)
     kept
 }
 
-/// The colour of a damage from 0 to 1 (viridis, linear), grey where nothing is known.
+/// The colour of a damage from 0 to 1, linear; grey where nothing is known. The sequence is Brewer's
+/// from yellow by orange to red, which all kinds of colour vision tell apart by its lightness: what
+/// is sound is pale on any ground, and what is damaged stands out.
 #[must_use]
 pub fn colour(damage: Option<f64>) -> Vec3 {
     let Some(damage) = damage else { return UNKNOWN };
-    let colorous::Color { r, g, b } = colorous::VIRIDIS.eval_continuous(damage.clamp(0.0, 1.0));
+    let scale = colorous::YELLOW_ORANGE_RED;
+    let colorous::Color { r, g, b } = scale.eval_continuous(damage.clamp(0.0, 1.0));
     // sRGB to linear (IEC 61966-2-1).
     let linear = |c: u8| {
         let c = f32::from(c) / 255.0;
@@ -196,7 +199,9 @@ mod tests {
     #[test]
     fn nothing_known_is_grey() {
         assert_eq!(colour(None), UNKNOWN);
-        assert!(colour(Some(1.0)).y > colour(Some(0.0)).y);
+        // The worse, the darker.
+        let light = [0.0, 0.25, 0.5, 0.75, 1.0].map(|d| colour(Some(d)).element_sum());
+        assert!(light.windows(2).all(|w| w[1] < w[0]), "{light:?}");
         // What is forecast is nearer to grey than what is measured, and not grey.
         for d in [0.0, 0.5, 1.0].map(Some) {
             let [pale, full] = [forecast(d), colour(d)].map(|c| c.distance(UNKNOWN));

@@ -11,6 +11,18 @@ use intrados_forecast::FORECAST;
 use intrados_predict::{MemberPrediction, Origin, Prediction};
 use intrados_stage::csv::{Table, number};
 
+/// All tables of a prediction but those of pores, by their names.
+#[must_use]
+pub fn tables(prediction: &Prediction) -> [(&'static str, String); 5] {
+    [
+        ("members", members_csv(prediction)),
+        ("zones", zones_csv(prediction)),
+        ("defects", defects_csv(prediction)),
+        ("slices", slices_csv(prediction)),
+        ("evidence", evidence_csv(prediction)),
+    ]
+}
+
 /// One row a member.
 #[must_use]
 pub(crate) fn members_csv(prediction: &Prediction) -> String {

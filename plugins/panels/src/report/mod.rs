@@ -1,12 +1,10 @@
-//! The Report tab: members coloured by damage in space, all of them in one table, and of the
-//! selected one every piece of evidence.
+//! The Report tab: all members in one table, every item of evidence and what became of it, and how
+//! good the prediction is where the truth is known.
 
-mod model;
 mod save;
-mod sheet;
 
 use bevy_ecs::prelude::*;
-use egui::{Grid, Rect, ScrollArea, Ui, pos2, vec2};
+use egui::{Grid, ScrollArea, Ui};
 use intrados_ct::score::Figure;
 use intrados_damage::{evidence::called, ledger::Group};
 use intrados_predict::{MemberPrediction, Prediction};
@@ -19,12 +17,11 @@ use crate::{
     number::{percent, plus_minus},
 };
 
-pub(crate) use save::take;
+pub(crate) use save::{save_report, take};
 
 /// What the tab remembers.
 #[derive(Resource, Default)]
 pub(crate) struct Report {
-    model: model::Model,
     save: save::Save,
 }
 
@@ -33,11 +30,6 @@ impl Report {
         self.save.is_busy()
     }
 }
-
-/// Height of the picture, as a share of the tab's, and its bounds, points.
-const PICTURE: (f32, f32, f32) = (0.55, 180.0, 460.0);
-/// Width of what stands beside it, points.
-const ASIDE: f32 = 320.0;
 
 pub(crate) fn report(
     InMut(ui): InMut<Ui>,
@@ -49,25 +41,11 @@ pub(crate) fn report(
     mut actions: ResMut<Actions>,
 ) {
     let Some(scene) = scene else { return };
-    let (share, least, most) = PICTURE;
-    let height = (share * ui.available_height()).clamp(least, most);
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         progress(ui, &latest, &mut actions);
         for failure in &latest.failures {
             ui.label(format!("⚠ {failure}"));
         }
-        let area = Rect::from_min_size(ui.cursor().min, vec2(ui.available_width(), height));
-        let middle = (area.right() - ASIDE).max(area.left() + 160.0);
-        let picture = Rect::from_min_max(area.min, pos2(middle - 8.0, area.bottom()));
-        report.bypass_change_detection().model.show(ui, picture, &scene.0, &latest, *selection, &mut actions);
-        let aside = Rect::from_min_max(pos2(middle, area.top()), area.max);
-        ui.scope_builder(egui::UiBuilder::new().max_rect(aside), |ui| {
-            ScrollArea::vertical().id_salt("sheet").max_height(height).show(ui, |ui| {
-                sheet::sheet(ui, &scene.0, &latest, *selection, &mut actions);
-            });
-        });
-        ui.advance_cursor_after_rect(area);
-        ui.add_space(8.0);
         let Some(result) = &latest.result else {
             ui.label("The table comes when all CT slices have been read, all lives computed and all gauges heard.");
             return;

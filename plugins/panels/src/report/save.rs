@@ -6,7 +6,7 @@ use bevy_ecs::prelude::*;
 use egui::{Button, TextEdit, Ui};
 use intrados_light::LitScene;
 use intrados_predict::Prediction;
-use intrados_report::{Record, RecordError};
+use intrados_report::{Record, RecordError, pdf};
 use intrados_scene::Scene;
 use intrados_stage::{Cancelled, Job, Jobs, Task, aside};
 
@@ -65,6 +65,29 @@ fn begin(
     Task::spawn(jobs, format!("writing {}", folder.display()), move |job| {
         let done = aside(|| write(&record, &folder, scene, &prediction, job));
         (folder, done)
+    })
+}
+
+/// The same for whoever asks from elsewhere, with a PDF of it; says what was written.
+pub(crate) fn save_report(
+    folder: PathBuf,
+    scene: Arc<Scene>,
+    prediction: Arc<Prediction>,
+    with_pdf: bool,
+    jobs: &mut Jobs,
+) -> Task<Result<String, String>> {
+    let command = format!("intrados predict {} --out {}", scene.name, folder.display());
+    let record = Record { command, ..Record::default() };
+    Task::spawn(jobs, format!("writing {}", folder.display()), move |job| {
+        let files = aside(|| write(&record, &folder, scene, &prediction, job))
+            .map_err(|e| e.to_string())?;
+        if !with_pdf {
+            return Ok(format!("{files} files into {}", folder.display()));
+        }
+        job.relabel("printing report.pdf");
+        let [html, to] = ["report.html", "report.pdf"].map(|name| folder.join(name));
+        pdf::print(&html, &to, job).map_err(|e| e.to_string())?;
+        Ok(format!("{files} files and report.pdf into {}", folder.display()))
     })
 }
 

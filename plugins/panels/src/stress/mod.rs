@@ -608,8 +608,13 @@ impl View<'_> {
         let density = ui.ctx().pixels_per_point();
         let size =
             [rect.width() * density, rect.height() * density].map(|n| (n as usize).clamp(8, 4096));
-        let surface =
-            Surface { positions: &positions, values: &values, faces: &faces, mesh: stress.mesh };
+        let surface = Surface {
+            positions: &positions,
+            values: &values,
+            faces: &faces,
+            mesh: stress.mesh,
+            sun: None,
+        };
         let drawn = surface::draw(camera, size, key.over, &surface, |v| quantity.colour(range, v));
         let texture = match texture {
             Some(mut texture) => {

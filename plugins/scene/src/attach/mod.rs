@@ -5,6 +5,7 @@
 //! wrong is known before anything changes; [`Proposal::commit`] puts it in place. `evidence.ron` is
 //! edited as text: comments and order stay.
 
+mod change;
 mod edit;
 mod listed;
 mod load_test;
@@ -27,6 +28,7 @@ use serde::Serialize;
 use tempfile::TempDir;
 
 pub use crate::file::evidence::{Along, Face, Finding, Kind};
+pub use change::Change;
 pub use listed::{Listed, listed};
 pub use raw::{Raw, VoxelType, VoxelTypeError};
 
@@ -690,19 +692,8 @@ impl Project {
         self.unchanged()?;
         write(&self.evidence(), &text)?;
         // The entry is gone: what is left of its files is no evidence any more.
-        let mut removed = Vec::new();
-        for copy in copies {
-            fs::remove_file(&copy).map_err(|e| AttachError::write(&copy, &e))?;
-            removed.push(copy);
-        }
-        for folder in removed.first().and_then(|f| f.parent()).into_iter().flat_map(Path::ancestors)
-        {
-            // Folders that hold something else stay.
-            if folder == self.folder || fs::remove_dir(folder).is_err() {
-                break;
-            }
-        }
-        Ok(Detached { removed })
+        change::clear(&copies, &self.folder)?;
+        Ok(Detached { removed: copies })
     }
 
     /// Refuses to take away what is named by other evidence: a load test by readings, a gauge by

@@ -1,0 +1,321 @@
+//! The form by which evidence is attached to a member: where, when, and what a file does not say
+//! itself.
+
+mod fill;
+
+use std::path::{Path, PathBuf};
+
+use bevy_ecs::prelude::*;
+use egui::{ComboBox, Grid, ScrollArea, TextEdit, Ui};
+use intrados_scene::{
+    Scene,
+    attach::{Attachment, Cut, Face, Finding, Kind, What},
+    plugin::CurrentScene,
+    structure::{Course, Electrode},
+};
+
+use crate::{Action, Actions, Selection, dialog};
+
+/// What is being attached.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Sort {
+    Finding,
+    Slices,
+    Stack,
+    Table,
+}
+
+/// Findings that can be noted, by what a site's form calls them, and what is measured of them.
+const FINDINGS: [(&str, &str); 8] = [
+    ("crack", "width, mm"),
+    ("spall", "area, m²"),
+    ("rust stain", "area, m²"),
+    ("efflorescence", "area, m²"),
+    ("wet spot", "area, m²"),
+    ("cover", "cover, mm"),
+    ("carbonation", "depth, mm"),
+    ("nothing wrong", ""),
+];
+
+/// How a crack runs.
+const COURSES: [(&str, Course); 4] = [
+    ("along the member", Course::Along),
+    ("across it", Course::Across),
+    ("diagonally", Course::Diagonal),
+    ("as a net", Course::Map),
+];
+
+/// What a table's values are; of gauges, the table says it by its columns.
+const KINDS: [(&str, Option<Kind>); 6] = [
+    ("what the table says", None),
+    ("cover", Some(Kind::Cover)),
+    ("rebound number", Some(Kind::Rebound)),
+    ("pulse velocity", Some(Kind::Velocity)),
+    ("half-cell potential", Some(Kind::HalfCell)),
+    ("carbonation depth", Some(Kind::Carbonation)),
+];
+
+const FACES: [Face; 8] = [
+    Face::Front,
+    Face::Back,
+    Face::Left,
+    Face::Right,
+    Face::Top,
+    Face::Bottom,
+    Face::Crown,
+    Face::Invert,
+];
+
+/// What has been filled in. Numbers are as they were typed.
+#[derive(Resource, Debug, Clone, Default)]
+pub(crate) struct Form {
+    pub(crate) is_open: bool,
+    /// Id of the member.
+    member: String,
+    sort: Option<Sort>,
+    files: Vec<PathBuf>,
+    name: String,
+    date: String,
+    from: String,
+    to: String,
+    face: Option<Face>,
+    height_m: String,
+    instrument: String,
+    finding: usize,
+    value: String,
+    error: String,
+    course: usize,
+    length_m: String,
+    picture: String,
+    pixel_mm: String,
+    voxel_mm: String,
+    depth_mm: String,
+    diameter_mm: String,
+    unit: String,
+    kind: usize,
+    test: String,
+    /// The path of a file that is to be added.
+    path: String,
+}
+
+impl Form {
+    /// Opens it for a member and what was dropped on the window.
+    pub(crate) fn begin(&mut self, member: &str, files: Vec<PathBuf>) {
+        let sort = match files.first() {
+            None => Sort::Finding,
+            Some(file) if What::is_table(file) == Some(true) => Sort::Table,
+            Some(_) => Sort::Slices,
+        };
+        let picture = Self::default();
+        *self = Self { is_open: true, member: member.into(), sort: Some(sort), files, ..picture };
+    }
+}
+
+/// Files that are evidence by their names: tables, slices, or a folder of slices.
+pub(crate) fn evidence(path: &Path) -> Option<Vec<PathBuf>> {
+    if !path.is_dir() {
+        return What::is_table(path).map(|_| vec![path.to_owned()]);
+    }
+    let entries = std::fs::read_dir(path).ok()?;
+    let mut files: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
+    files.retain(|file| What::is_table(file) == Some(false));
+    files.sort();
+    (!files.is_empty()).then_some(files)
+}
+
+/// The form, over the window.
+pub(crate) fn form(
+    InMut(ui): InMut<Ui>,
+    mut form: ResMut<Form>,
+    scene: Option<Res<CurrentScene>>,
+    selection: Res<Selection>,
+    mut actions: ResMut<Actions>,
+) {
+    let Some(scene) = scene else { return };
+    let form = form.bypass_change_detection();
+    // Who clicks another member while it is open means that one.
+    if let Some(member) = selection.0.and_then(|i| scene.0.members.get(i)) {
+        form.member.clone_from(&member.id);
+    }
+    ui.strong(format!("to {}", scene.0.name_of(&form.member)));
+    ui.horizontal_wrapped(|ui| {
+        for (sort, name) in [
+            (Sort::Finding, "A finding"),
+            (Sort::Slices, "CT slices"),
+            (Sort::Stack, "A CT volume"),
+            (Sort::Table, "A table"),
+        ] {
+            ui.selectable_value(&mut form.sort, Some(sort), name);
+        }
+    });
+    ui.separator();
+    // The button stays in sight however many fields there are.
+    let most = (ui.ctx().content_rect().height() - 230.0).max(60.0);
+    let area = ScrollArea::vertical().max_height(most).min_scrolled_height(most);
+    area.show(ui, |ui| fields(ui, form, &mut actions));
+    ui.separator();
+    send(ui, form, &scene.0, &mut actions);
+}
+
+fn fields(ui: &mut Ui, form: &mut Form, actions: &mut Actions) {
+    if form.sort != Some(Sort::Finding) {
+        files(ui, form, actions);
+    }
+    Grid::new("form").num_columns(2).spacing([10.0, 5.0]).show(ui, |ui| {
+        match form.sort {
+            Some(Sort::Finding) => finding(ui, form),
+            Some(Sort::Table) => table(ui, form),
+            Some(Sort::Slices | Sort::Stack) => cut(ui, form),
+            None => {}
+        }
+        place(ui, form);
+    });
+}
+
+/// The button, and what keeps it from being pressed.
+fn send(ui: &mut Ui, form: &mut Form, scene: &Scene, actions: &mut Actions) {
+    let filled = form.attachment();
+    ui.horizontal_wrapped(|ui| {
+        let may = filled.is_ok() && scene.path.exists();
+        if ui.add_enabled(may, egui::Button::new("Attach")).clicked()
+            && let Ok(what) = &filled
+        {
+            actions.ask(Action::Attach(Box::new(what.clone())));
+            form.is_open = false;
+        }
+        if ui.button("Cancel").clicked() {
+            form.is_open = false;
+        }
+        if let Err(why) = &filled {
+            ui.weak(why);
+        } else if !scene.path.exists() {
+            ui.weak("This scene is part of the program: `intrados new` makes one that is yours.");
+        }
+    });
+}
+
+fn files(ui: &mut Ui, form: &mut Form, actions: &mut Actions) {
+    for (n, file) in form.files.iter().enumerate().take(4) {
+        ui.label(file.display().to_string());
+        if n == 3 && form.files.len() > 4 {
+            ui.weak(format!("and {} more", form.files.len() - 4));
+        }
+    }
+    ui.horizontal(|ui| {
+        let label = ui.label("File or folder");
+        let field = TextEdit::singleline(&mut form.path).desired_width(220.0);
+        ui.add(field).labelled_by(label.id);
+        let path = PathBuf::from(form.path.trim());
+        let can = !form.path.trim().is_empty();
+        if ui.add_enabled(can, egui::Button::new("Add")).clicked() {
+            form.files.extend(evidence(&path).unwrap_or_else(|| vec![path]));
+            form.path.clear();
+        }
+        if ui.button("Browse…").clicked() {
+            actions.ask(Action::ChooseEvidence);
+        }
+        if !form.files.is_empty() && ui.button("Clear").clicked() {
+            form.files.clear();
+        }
+    });
+    if let [file] = &form.files[..]
+        && dialog::is_photograph(file)
+        && ui.link("It is a photograph: place it first").clicked()
+    {
+        actions.ask(Action::Photograph(file.clone()));
+        form.is_open = false;
+    }
+}
+
+/// Adds files that a dialog has brought.
+pub(crate) fn add(form: &mut Form, files: Vec<PathBuf>) {
+    form.files.extend(files);
+}
+
+/// A field of text with its name.
+fn field(ui: &mut Ui, name: &str, text: &mut String, hint: &str) {
+    let label = ui.label(name);
+    ui.add(TextEdit::singleline(text).hint_text(hint).desired_width(180.0)).labelled_by(label.id);
+    ui.end_row();
+}
+
+/// One of several.
+fn choice(ui: &mut Ui, name: &str, chosen: &mut usize, names: &[&str]) {
+    let label = ui.label(name);
+    ComboBox::from_id_salt(name)
+        .selected_text(names.get(*chosen).copied().unwrap_or_default())
+        .show_ui(ui, |ui| {
+            for (n, name) in names.iter().enumerate() {
+                ui.selectable_value(chosen, n, *name);
+            }
+        })
+        .response
+        .labelled_by(label.id);
+    ui.end_row();
+}
+
+fn finding(ui: &mut Ui, form: &mut Form) {
+    choice(ui, "What", &mut form.finding, &FINDINGS.map(|(name, _)| name));
+    let measured = FINDINGS.get(form.finding).map_or("", |f| f.1);
+    if !measured.is_empty() {
+        field(ui, measured, &mut form.value, "");
+    }
+    if measured.ends_with("mm") {
+        field(ui, "standard error, mm", &mut form.error, "usual of the instrument");
+    }
+    if form.finding == 0 {
+        choice(ui, "It runs", &mut form.course, &COURSES.map(|(name, _)| name));
+        field(ui, "length, m", &mut form.length_m, "unknown");
+    }
+    if form.finding == 1 {
+        field(ui, "depth, mm", &mut form.depth_mm, "unknown");
+    }
+    field(ui, "Photograph of it", &mut form.picture, "path of a JPEG or PNG");
+}
+
+fn table(ui: &mut Ui, form: &mut Form) {
+    choice(ui, "Its values are", &mut form.kind, &KINDS.map(|(name, _)| name));
+    field(ui, "Unit", &mut form.unit, "as the table says");
+    field(ui, "Load test", &mut form.test, "of gauges");
+}
+
+fn cut(ui: &mut Ui, form: &mut Form) {
+    if form.sort == Some(Sort::Slices) {
+        field(ui, "pixel, mm", &mut form.pixel_mm, "as the files say");
+    } else {
+        field(ui, "voxel, mm", &mut form.voxel_mm, "x, y, z, or as the files say");
+    }
+    field(ui, "core's diameter, mm", &mut form.diameter_mm, "sawn");
+    field(ui, "depth below the face, mm", &mut form.depth_mm, "unknown");
+}
+
+fn place(ui: &mut Ui, form: &mut Form) {
+    let (from, to) = match form.sort {
+        Some(Sort::Slices | Sort::Stack) => ("along, 0 to 1", None),
+        _ => ("along from, 0 to 1", Some("along to")),
+    };
+    field(ui, from, &mut form.from, "from the start of its axis");
+    if let Some(to) = to {
+        field(ui, to, &mut form.to, "the same place");
+    }
+    let label = ui.label("Face");
+    ComboBox::from_id_salt("face")
+        .selected_text(form.face.map_or("unknown", Face::name))
+        .show_ui(ui, |ui| {
+            ui.selectable_value(&mut form.face, None, "unknown");
+            for face in FACES {
+                ui.selectable_value(&mut form.face, Some(face), face.name());
+            }
+        })
+        .response
+        .labelled_by(label.id);
+    ui.end_row();
+    field(ui, "Date", &mut form.date, "2026-05-03");
+    if !matches!(form.sort, Some(Sort::Slices | Sort::Stack)) {
+        field(ui, "Instrument", &mut form.instrument, "");
+    }
+    if form.sort == Some(Sort::Finding) {
+        field(ui, "height, m", &mut form.height_m, "above its lowest point");
+    }
+    field(ui, "Name", &mut form.name, "one is made");
+}

@@ -1,0 +1,335 @@
+//! Everything that can be asked for, by name and by key: one list for the keys, for the sheet of keys
+//! and for the palette.
+
+use bevy_ecs::prelude::*;
+use egui::{Key, Modifiers, RichText, ScrollArea, TextEdit, Ui};
+use intrados_light::View;
+use intrados_scene::plugin::CurrentScene;
+
+use crate::{
+    Action, Actions, Look, Quantity, Workspace, layout::Layout, place::Panels, recent::Recent,
+    saving::Taken, workspace::Desk,
+};
+
+/// Something with a name that a user can ask for.
+pub(crate) struct Command {
+    /// What it does, for people; begins with a small letter.
+    pub(crate) name: String,
+    /// Its keys, for people.
+    keys: &'static str,
+    shortcut: Option<(Modifiers, Key)>,
+    action: Action,
+}
+
+/// What the pointer does, for the sheet of keys.
+const GESTURES: [(&str, &str); 6] = [
+    ("Drag", "orbit"),
+    ("Shift+drag, middle or right drag", "pan"),
+    ("Wheel", "nearer, farther"),
+    ("Click", "select a member"),
+    ("Double-click", "look at a member"),
+    ("Drag a tab", "dock a panel elsewhere"),
+];
+
+/// The palette: what has been typed, and which line is chosen.
+#[derive(Resource, Default)]
+pub(crate) struct Palette {
+    pub(crate) is_open: bool,
+    query: String,
+    chosen: usize,
+}
+
+impl Palette {
+    pub(crate) fn toggle(&mut self) {
+        *self = Self { is_open: !self.is_open, ..Self::default() };
+    }
+}
+
+fn command(
+    name: impl Into<String>,
+    keys: &'static str,
+    shortcut: Option<(Modifiers, Key)>,
+    action: Action,
+) -> Command {
+    Command { name: name.into(), keys, shortcut, action }
+}
+
+/// What can always be asked for.
+fn fixed(look: &Look) -> Vec<Command> {
+    const CTRL: Modifiers = Modifiers::COMMAND;
+    const NONE: Modifiers = Modifiers::NONE;
+    let shifted = CTRL | Modifiers::SHIFT;
+    let is_error = look.quantity == Quantity::Error;
+    let quantity = if is_error { Quantity::Radiance } else { Quantity::Error };
+    let by = |modifiers: Modifiers, key: Key| Some((modifiers, key));
+    vec![
+        command("open a file", "Ctrl+O", by(CTRL, Key::O), Action::Choose),
+        command("save the report", "Ctrl+S", by(CTRL, Key::S), Action::Save(Taken::Report)),
+        command("save the picture of light", "Ctrl+E", by(CTRL, Key::E), Action::Export),
+        command(
+            "save a picture of the window",
+            "F12",
+            by(NONE, Key::F12),
+            Action::Save(Taken::Picture(None)),
+        ),
+        command(
+            "save a picture of the structure, with its legend",
+            "",
+            None,
+            Action::Save(Taken::Picture(Some("Structure".into()))),
+        ),
+        command("attach evidence", "A", by(NONE, Key::A), Action::Fill(Vec::new())),
+        // Before the one that asks for less: Ctrl+Z alone would take Shift along.
+        command("redo", "Ctrl+Shift+Z  Ctrl+Y", by(shifted, Key::Z), Action::Redo),
+        command("undo", "Ctrl+Z", by(CTRL, Key::Z), Action::Undo),
+        command("", "", by(CTRL, Key::Y), Action::Redo),
+        command("list all commands", "Ctrl+P  Ctrl+K", by(CTRL, Key::P), Action::Palette),
+        command("list of keys", "F1  ?", by(NONE, Key::F1), Action::Keys),
+        command("inspector's or expert's layout", "F9", by(NONE, Key::F9), Action::SwapWorkspace),
+        command("lay panels out as at first", "", None, Action::ResetLayout),
+        command("next member", "Page down", by(NONE, Key::PageDown), Action::Step(true)),
+        command("previous member", "Page up", by(NONE, Key::PageUp), Action::Step(false)),
+        command(
+            "fit the selected member, or everything, into the picture",
+            "F",
+            by(NONE, Key::F),
+            Action::Frame,
+        ),
+        command(
+            "all of it, from the scene's own camera",
+            "Home",
+            by(NONE, Key::Home),
+            Action::Home,
+        ),
+        command("pause or continue", "Space", by(NONE, Key::Space), Action::Pause),
+        command("restart the picture", "R", by(NONE, Key::R), Action::Restart),
+        command("primal side", "1", by(NONE, Key::Num1), Action::Show(View::Primal)),
+        command("dual side", "2", by(NONE, Key::Num2), Action::Show(View::Dual)),
+        command("both sides combined", "3", by(NONE, Key::Num3), Action::Show(View::Combined)),
+        command("light or error", "E", by(NONE, Key::E), Action::ShowQuantity(quantity)),
+        command("go on with the prediction", "", None, Action::Predict),
+        command("reload the scene", "", None, Action::Reload),
+        command("start screen", "", None, Action::StartScreen(true)),
+        command("light theme", "", None, Action::Theme(egui::ThemePreference::Light)),
+        command("dark theme", "", None, Action::Theme(egui::ThemePreference::Dark)),
+        command("theme of the system", "", None, Action::Theme(egui::ThemePreference::System)),
+        command("full screen", "F11", by(NONE, Key::F11), Action::Fullscreen),
+        command(
+            "put away a sheet or a message, or unselect",
+            "Esc",
+            by(NONE, Key::Escape),
+            Action::Dismiss,
+        ),
+        command("quit", "Ctrl+Q", by(CTRL, Key::Q), Action::Quit),
+        command("", "", by(CTRL, Key::K), Action::Palette),
+        command("", "", by(NONE, Key::Questionmark), Action::Keys),
+        command("", "", by(shifted, Key::P), Action::Palette),
+    ]
+}
+
+/// All of them, those too that depend on what is open.
+fn all(world: &World) -> Vec<Command> {
+    let mut all = fixed(world.resource::<Look>());
+    all.retain(|c| !c.name.is_empty());
+    for workspace in Workspace::BOTH {
+        let name = format!("layout: {}", workspace.name());
+        all.push(command(name, "", None, Action::Arrange(workspace)));
+    }
+    for panel in &world.resource::<Panels>().0 {
+        let action = Action::Panel(panel.name.clone(), true);
+        all.push(command(format!("panel: {}", panel.name), "", None, action));
+    }
+    if let Some(scene) = world.get_resource::<CurrentScene>() {
+        for (index, member) in scene.0.members.iter().enumerate() {
+            let name = format!("member: {}", member.name);
+            all.push(command(name, "", None, Action::Select(Some(index))));
+        }
+        for (index, camera) in scene.0.cameras.iter().enumerate() {
+            let name = format!("camera: {}", camera.name);
+            all.push(command(name, "", None, Action::Camera(index)));
+        }
+    }
+    for path in world.resource::<Recent>().list() {
+        let name = format!("open {}", path.display());
+        all.push(command(name, "", None, Action::Open(path.clone())));
+    }
+    all
+}
+
+/// Puts what keys ask for into the actions. A field that has the focus keeps its letters; keys with
+/// Ctrl and those at the top of the keyboard act anywhere.
+pub(crate) fn keys(ui: &Ui, world: &mut World) {
+    let is_typing = ui.ctx().text_edit_focused();
+    // A button that has the focus is pressed by it.
+    let has_focus = ui.ctx().memory(|m| m.focused().is_some());
+    let commands = fixed(world.resource::<Look>());
+    let acts_anywhere = |modifiers: Modifiers, key: Key| {
+        modifiers.command && !matches!(key, Key::Z | Key::Y)
+            || matches!(key, Key::F1 | Key::F9 | Key::F11 | Key::F12)
+    };
+    let asked: Vec<Action> = ui.input_mut(|i| {
+        let own = commands.into_iter().filter_map(|c| Some((c.shortcut?, c.action)));
+        own.filter(|((modifiers, key), _)| {
+            let is_taken = is_typing || has_focus && *key == Key::Space;
+            if is_taken && !acts_anywhere(*modifiers, *key) {
+                return false;
+            }
+            if modifiers.any() {
+                return i.consume_key(*modifiers, *key);
+            }
+            // Shift is part of writing “?”.
+            (!i.modifiers.any() || i.modifiers.shift_only()) && i.key_pressed(*key)
+        })
+        .map(|(_, action)| action)
+        .collect()
+    });
+    let mut actions = world.resource_mut::<Actions>();
+    asked.into_iter().for_each(|action| actions.ask(action));
+}
+
+/// The sheet of keys.
+pub(crate) fn sheet(ui: &Ui, world: &mut World) {
+    let mut open = world.resource::<Layout>().keys;
+    if !open {
+        return;
+    }
+    let commands = fixed(world.resource::<Look>());
+    let rows = commands.iter().map(|c| (c.keys, c.name.as_str()));
+    let rows: Vec<(&str, &str)> = rows.filter(|(keys, _)| !keys.is_empty()).collect();
+    let height = (ui.ctx().content_rect().height() - 80.0).max(80.0);
+    egui::Window::new("Keys")
+        .collapsible(false)
+        .resizable(false)
+        .anchor(egui::Align2::CENTER_CENTER, [0.0, 0.0])
+        .open(&mut open)
+        .show(ui.ctx(), |ui| {
+            ScrollArea::vertical().max_height(height).show(ui, |ui| {
+                egui::Grid::new("keys").num_columns(2).striped(true).show(ui, |ui| {
+                    for (keys, what) in rows.iter().chain(&GESTURES) {
+                        ui.strong(*keys);
+                        ui.label(*what);
+                        ui.end_row();
+                    }
+                });
+            });
+        });
+    world.resource_mut::<Layout>().keys = open;
+}
+
+/// The palette: type some letters of what is wanted, Enter does it.
+pub(crate) fn palette(ui: &Ui, world: &mut World) {
+    if !world.resource::<Palette>().is_open {
+        return;
+    }
+    let mut palette = std::mem::take(&mut *world.resource_mut::<Palette>());
+    let commands = all(world);
+    let fits = fitting(&commands, &palette.query);
+    let count = fits.len();
+    let (mut chosen, mut done) = (None, false);
+    ui.input_mut(|i| {
+        if i.consume_key(Modifiers::NONE, Key::ArrowDown) {
+            palette.chosen = (palette.chosen + 1).min(count.saturating_sub(1));
+        }
+        if i.consume_key(Modifiers::NONE, Key::ArrowUp) {
+            palette.chosen = palette.chosen.saturating_sub(1);
+        }
+        if i.consume_key(Modifiers::NONE, Key::Enter) {
+            (chosen, done) = (fits.get(palette.chosen).copied(), true);
+        }
+        done |= i.consume_key(Modifiers::NONE, Key::Escape);
+    });
+    let screen = ui.ctx().content_rect();
+    let width = (screen.width() - 40.0).min(560.0);
+    egui::Window::new("Commands")
+        .title_bar(false)
+        .resizable(false)
+        .fixed_size([width, 0.0])
+        .anchor(egui::Align2::CENTER_TOP, [0.0, 48.0])
+        .show(ui.ctx(), |ui| {
+            let field = TextEdit::singleline(&mut palette.query)
+                .hint_text("Type what you want to do")
+                .desired_width(f32::INFINITY);
+            let response = ui.add(field);
+            response
+                .widget_info(|| egui::WidgetInfo::labeled(egui::Role::TextInput, true, "Command"));
+            response.request_focus();
+            if response.changed() {
+                palette.chosen = 0;
+            }
+            let most = (screen.height() - 140.0).clamp(60.0, 420.0);
+            ScrollArea::vertical().max_height(most).auto_shrink([false, true]).show(ui, |ui| {
+                for (line, &index) in fits.iter().enumerate() {
+                    let is_chosen = line == palette.chosen;
+                    let row = row(ui, &commands[index], is_chosen);
+                    if row.clicked() {
+                        (chosen, done) = (Some(index), true);
+                    }
+                    if is_chosen {
+                        row.scroll_to_me(None);
+                    }
+                }
+                if fits.is_empty() {
+                    ui.weak("No command is called so.");
+                }
+            });
+        });
+    let action = chosen.and_then(|index| commands.into_iter().nth(index)).map(|c| c.action);
+    if !done {
+        *world.resource_mut::<Palette>() = palette;
+    }
+    if let Some(action) = action {
+        world.resource_mut::<Actions>().ask(action);
+    }
+}
+
+fn row(ui: &mut Ui, command: &Command, is_chosen: bool) -> egui::Response {
+    let mut letters = command.name.chars();
+    let first: String = letters.next().map(|c| c.to_uppercase().collect()).unwrap_or_default();
+    let text = RichText::new(first + letters.as_str());
+    let button = egui::Button::selectable(is_chosen, text).shortcut_text(command.keys);
+    let width = ui.available_width();
+    ui.add_sized([width, 22.0], button.min_size(egui::vec2(width, 22.0)))
+}
+
+/// Those whose names have every word that was typed; those that begin with it first.
+fn fitting(commands: &[Command], query: &str) -> Vec<usize> {
+    let query = query.trim().to_lowercase();
+    let words: Vec<&str> = query.split_whitespace().collect();
+    let names: Vec<String> = commands.iter().map(|c| c.name.to_lowercase()).collect();
+    let has_all = |i: &usize| words.iter().all(|w| names[*i].contains(w));
+    let mut fits: Vec<usize> = (0..commands.len()).filter(has_all).collect();
+    fits.sort_by_key(|&i| !names[i].starts_with(&query));
+    fits
+}
+
+/// Whether the expert's layout is shown.
+pub(crate) fn is_expert(world: &World) -> bool {
+    world.resource::<Desk>().shown() == Workspace::Expert
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn commands_are_found_by_any_of_their_words() {
+        let commands = fixed(&Look::default());
+        let name = |query: &str| {
+            let fits = fitting(&commands, query);
+            commands[fits[0]].name.clone()
+        };
+        assert_eq!(name("full"), "full screen");
+        assert_eq!(name("MEMBER next"), "next member");
+        assert!(fitting(&commands, "no such thing").is_empty());
+    }
+
+    #[test]
+    fn no_key_does_two_things() {
+        let commands = fixed(&Look::default());
+        let mut keys: Vec<_> = commands.iter().filter_map(|c| c.shortcut).collect();
+        let count = keys.len();
+        keys.sort_by_key(|(m, k)| (m.command, m.shift, k.name()));
+        keys.dedup();
+        assert_eq!(keys.len(), count);
+    }
+}

@@ -1,0 +1,296 @@
+//! What is taken out: the report as files and as PDF, a table alone, a panel as it is seen.
+
+use std::{
+    io::Write,
+    path::{Path, PathBuf},
+    sync::{Arc, Mutex, PoisonError, mpsc},
+};
+
+use bevy_ecs::prelude::*;
+use egui::{Button, ColorImage, Rect, TextEdit, Ui};
+use intrados_predict::Prediction;
+use intrados_report::{pdf, tables};
+use intrados_scene::plugin::CurrentScene;
+use intrados_stage::{
+    Jobs, Task,
+    file::{self, file_name},
+};
+
+use crate::{Action, Actions, Banners, Latest, Log, export::write_png, report, toast::Toasts};
+
+/// What can be saved.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Taken {
+    /// The report, with tables and models, in a folder.
+    Report,
+    /// One table of the prediction, by its name.
+    Table(&'static str),
+    /// A panel as it is seen, with its legend; none: the whole window.
+    Picture(Option<String>),
+}
+
+/// Tables by their names, and what is in them.
+const TABLES: [(&str, &str); 5] = [
+    ("members", "Members…"),
+    ("zones", "Zones of members…"),
+    ("defects", "Defects…"),
+    ("slices", "CT slices…"),
+    ("evidence", "Evidence, used or not…"),
+];
+
+/// The sheet that asks where to, and what is being written.
+#[derive(Resource, Default)]
+pub(crate) struct Saving {
+    shown: Option<Taken>,
+    path: String,
+    with_pdf: bool,
+    task: Option<Task<Result<String, String>>>,
+    /// A picture that is to be taken of the window, once it is drawn.
+    wanted: Option<(PathBuf, Option<Rect>)>,
+    /// Where it comes, once it was asked for.
+    coming: Option<Mutex<mpsc::Receiver<Arc<ColorImage>>>>,
+}
+
+impl Saving {
+    /// Asks where to.
+    pub(crate) fn ask(&mut self, what: Taken, scene: &str) {
+        let name = file_name(scene);
+        self.path = match &what {
+            Taken::Report => format!("{name}-damage"),
+            Taken::Table(table) => format!("{name}-{table}.csv"),
+            Taken::Picture(_) => format!("{name}.png"),
+        };
+        self.shown = Some(what);
+    }
+
+    pub(crate) fn is_shown(&self) -> bool {
+        self.shown.is_some()
+    }
+
+    /// Puts the sheet away; false if there was none.
+    pub(crate) fn dismiss(&mut self) -> bool {
+        self.shown.take().is_some()
+    }
+
+    pub(crate) fn is_busy(&self) -> bool {
+        self.task.is_some()
+    }
+
+    /// Where it would go.
+    pub(crate) fn proposal(&self) -> String {
+        self.path.clone()
+    }
+
+    /// Where a dialog says.
+    pub(crate) fn put(&mut self, path: &Path) {
+        self.path = path.display().to_string();
+    }
+
+    /// Takes a picture of the window, or of what is at a place in it, in the next frame.
+    pub(crate) fn take_picture(&mut self, path: PathBuf, of: Option<Rect>) {
+        self.wanted = Some((path, of));
+    }
+}
+
+/// Entries of the menu.
+pub(crate) fn menu(ui: &mut Ui, has_prediction: bool, asked: &mut Vec<Action>) {
+    let hint = "report.html, BCF for the model's authors, tables as CSV, the members coloured by damage as GLB and VTU";
+    let report = ui.add_enabled(has_prediction, Button::new("Report…").shortcut_text("Ctrl+S"));
+    if report.on_hover_text(hint).clicked() {
+        asked.push(Action::Save(Taken::Report));
+    }
+    ui.menu_button("Table as CSV", |ui| {
+        for (name, title) in TABLES {
+            if ui.add_enabled(has_prediction, Button::new(title)).clicked() {
+                asked.push(Action::Save(Taken::Table(name)));
+            }
+        }
+    });
+    ui.separator();
+    if ui.button("Picture of the structure, with legend…").clicked() {
+        asked.push(Action::Save(Taken::Picture(Some("Structure".into()))));
+    }
+    if ui.add(Button::new("Picture of the window…").shortcut_text("F12")).clicked() {
+        asked.push(Action::Save(Taken::Picture(None)));
+    }
+    if ui.add(Button::new("Picture of light, PNG or EXR…").shortcut_text("Ctrl+E")).clicked() {
+        asked.push(Action::Export);
+    }
+    if !has_prediction {
+        ui.weak("Report and tables come with the prediction.");
+    }
+}
+
+/// The sheet.
+pub(crate) fn sheet(
+    InMut(ui): InMut<Ui>,
+    mut saving: ResMut<Saving>,
+    scene: Option<Res<CurrentScene>>,
+    latest: Res<Latest>,
+    mut jobs: ResMut<Jobs>,
+    mut actions: ResMut<Actions>,
+) {
+    let saving = saving.bypass_change_detection();
+    let (Some(what), Some(scene)) = (saving.shown.clone(), scene) else { return };
+    let is_report = what == Taken::Report;
+    ui.label(match &what {
+        Taken::Report => {
+            "HTML, BCF, tables and models, as `intrados predict --out` writes them.".into()
+        }
+        Taken::Table(name) => format!("The table of {name}: UTF-8, units in the header."),
+        Taken::Picture(_) => "PNG, as it is seen now.".to_owned(),
+    });
+    ui.horizontal(|ui| {
+        let label = ui.label(if is_report { "Folder to write" } else { "File to write" });
+        ui.add(TextEdit::singleline(&mut saving.path).desired_width(280.0)).labelled_by(label.id);
+        if ui.button("Browse…").clicked() {
+            actions.ask(Action::ChooseSave);
+        }
+    });
+    if is_report {
+        let can = pdf::printer().is_some();
+        ui.add_enabled_ui(can, |ui| ui.checkbox(&mut saving.with_pdf, "and report.pdf"));
+        if !can {
+            ui.weak(pdf::BY_HAND);
+        }
+    }
+    let result = latest.result_for(&scene.0).cloned();
+    let needs = !matches!(what, Taken::Picture(_));
+    let why_not = if saving.path.trim().is_empty() {
+        Some("It needs a name.")
+    } else if needs && result.is_none() {
+        Some("The prediction is not done yet.")
+    } else {
+        None
+    };
+    ui.horizontal(|ui| {
+        let may = why_not.is_none() && saving.task.is_none();
+        if ui.add_enabled(may, Button::new("Save")).clicked() {
+            let path = PathBuf::from(saving.path.trim());
+            match (what, result) {
+                (Taken::Picture(panel), _) => actions.ask(Action::TakePicture(path, panel)),
+                (Taken::Table(name), Some(result)) => {
+                    saving.task = Some(table(name, path, result, &mut jobs));
+                }
+                (Taken::Report, Some(result)) => {
+                    let with_pdf = saving.with_pdf && pdf::printer().is_some();
+                    saving.task = Some(report::save_report(
+                        path,
+                        Arc::clone(&scene.0),
+                        result,
+                        with_pdf,
+                        &mut jobs,
+                    ));
+                }
+                _ => {}
+            }
+            saving.shown = None;
+        }
+        if ui.button("Cancel").clicked() {
+            saving.shown = None;
+        }
+        if let Some(why) = why_not {
+            ui.weak(why);
+        }
+    });
+}
+
+fn table(
+    name: &'static str,
+    path: PathBuf,
+    result: Arc<Prediction>,
+    jobs: &mut Jobs,
+) -> Task<Result<String, String>> {
+    Task::spawn(jobs, format!("writing {}", path.display()), move |_| {
+        let all = tables(&result);
+        let text = all.iter().find(|t| t.0 == name).map_or("", |t| t.1.as_str());
+        let written = file::put(&path, |out| out.write_all(text.as_bytes()));
+        written.map(|()| path.display().to_string()).map_err(|e| format!("{}: {e}", path.display()))
+    })
+}
+
+/// Asks the window for its picture, and takes it when it comes.
+pub(crate) fn picture(ui: &Ui, world: &mut World) {
+    let mut saving = std::mem::take(&mut *world.resource_mut::<Saving>());
+    if saving.wanted.is_some() && saving.coming.is_none() {
+        let (mine, theirs) = mpsc::channel();
+        let ctx = ui.ctx().clone();
+        ui.ctx().request_screenshot(move |image| {
+            // Whoever asked may be gone when it comes.
+            let _ = mine.send(image);
+            ctx.request_repaint();
+        });
+        saving.coming = Some(Mutex::new(theirs));
+    }
+    let image = saving
+        .coming
+        .as_ref()
+        .and_then(|coming| coming.lock().unwrap_or_else(PoisonError::into_inner).try_recv().ok());
+    if let Some(image) = image
+        && let Some((path, of)) = saving.wanted.take()
+    {
+        saving.coming = None;
+        let density = ui.ctx().pixels_per_point();
+        let mut jobs = world.resource_mut::<Jobs>();
+        let label = format!("writing {}", path.display());
+        saving.task = Some(Task::spawn(&mut jobs, label, move |_| {
+            let part = match of {
+                Some(rect) => cut(&image, rect, density),
+                None => ColorImage::clone(&image),
+            };
+            let written = write_png(&part, &path);
+            let named = path.display();
+            written.map(|()| named.to_string()).map_err(|e| format!("{named}: {e}"))
+        }));
+    }
+    *world.resource_mut::<Saving>() = saving;
+}
+
+/// What of a picture lies in a rectangle of so many points.
+fn cut(image: &ColorImage, rect: Rect, density: f32) -> ColorImage {
+    let [w, h] = image.size;
+    let at = |x: f32, most: usize| ((x * density).round().max(0.0) as usize).min(most);
+    let [left, right] = [at(rect.left(), w), at(rect.right(), w)];
+    let [top, bottom] = [at(rect.top(), h), at(rect.bottom(), h)];
+    let rows = (top..bottom).flat_map(|y| &image.pixels[y * w + left..y * w + right]);
+    ColorImage::new([right - left, bottom - top], rows.copied().collect())
+}
+
+/// Says how a write ended.
+pub(crate) fn take(
+    mut saving: ResMut<Saving>,
+    mut banners: ResMut<Banners>,
+    mut toasts: ResMut<Toasts>,
+    mut log: ResMut<Log>,
+) {
+    let Some(done) = Task::take(&mut saving.bypass_change_detection().task) else { return };
+    match done {
+        Ok(Ok(what)) => {
+            toasts.say(format!("Saved {what}"));
+            log.say(format!("saved {what}"));
+        }
+        Ok(Err(why)) => {
+            log.say(format!("⚠ not saved: {why}"));
+            banners.cannot("Not saved", &why);
+        }
+        // What a panic said is told with all others.
+        Err(_) => {}
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use egui::{Color32, pos2};
+
+    use super::*;
+
+    #[test]
+    fn a_picture_is_cut_in_pixels_and_never_beyond_its_rim() {
+        let pixels = (0..12).map(|k| Color32::from_gray(k as u8)).collect();
+        let image = ColorImage::new([4, 3], pixels);
+        let part = cut(&image, Rect::from_min_max(pos2(0.5, 0.5), pos2(9.0, 1.0)), 2.0);
+        assert_eq!(part.size, [3, 1]);
+        let grey: Vec<u8> = part.pixels.iter().map(|p| p.r()).collect();
+        assert_eq!(grey, [5, 6, 7]);
+    }
+}

@@ -1,0 +1,60 @@
+//! Damage of a member's zones as bars.
+
+use egui::{Rect, Sense, Ui, pos2, vec2};
+use intrados_damage::{
+    verdict::Basis,
+    zone::{ZONES, place},
+};
+use intrados_predict::Predicted;
+
+use crate::{colours, number::plus_minus};
+
+/// Height of the bars, points.
+const HEIGHT: f32 = 60.0;
+
+/// Damage of the zones from the start of the axis to its end, with their 95 % intervals.
+pub(super) fn bars(ui: &mut Ui, predicted: &Predicted) {
+    let (rect, response) =
+        ui.allocate_exact_size(vec2(ui.available_width().min(420.0), HEIGHT), Sense::hover());
+    response.widget_info(|| {
+        egui::WidgetInfo::labeled(egui::Role::Image, true, "Damage along the member")
+    });
+    let width = rect.width() / ZONES as f32;
+    let y = |d: f64| rect.bottom() - rect.height() * d.clamp(0.0, 1.0) as f32;
+    let line = (1.0, ui.visuals().weak_text_color());
+    ui.painter().rect_filled(rect, 1.0, ui.visuals().extreme_bg_color);
+    ui.painter().rect_stroke(rect, 1.0, line, egui::StrokeKind::Inside);
+    for (zone, reading) in predicted.zones.0.iter().enumerate() {
+        let left = rect.left() + width * zone as f32;
+        let Some(r) = reading else {
+            let [low, high] = [left + 2.0, left + width - 2.0];
+            // Hatched: an empty column would look like a sound one.
+            for k in 0..6 {
+                let at = rect.top() + rect.height() * (k as f32 + 0.5) / 6.0;
+                let ends = [pos2(low, at + 4.0), pos2(high, at - 4.0)];
+                ui.painter().line_segment(ends, (1.0, colours::UNKNOWN));
+            }
+            continue;
+        };
+        let is_forecast = predicted.basis[zone] == Basis::Forecast;
+        let column = Rect::from_min_max(
+            pos2(left + 2.0, y(r.value.max(0.02))),
+            pos2(left + width - 2.0, rect.bottom()),
+        );
+        ui.painter().rect_filled(column, 0.0, colours::damage_ink(r.value as f32, is_forecast));
+        let range = [y(r.value + 1.96 * r.std_error), y(r.value - 1.96 * r.std_error)];
+        let ink = (1.5, ui.visuals().strong_text_color());
+        ui.painter().vline(left + 0.5 * width, range[0]..=range[1], ink);
+    }
+    if let Some(at) = response.hover_pos() {
+        let zone = (((at.x - rect.left()) / width) as usize).min(ZONES - 1);
+        let said = predicted.zones.0[zone]
+            .map_or("nothing known".into(), |r| plus_minus(r.value, r.std_error, ""));
+        response.on_hover_text(format!(
+            "{} of the axis: {said}, {}",
+            place(zone),
+            predicted.basis[zone].name()
+        ));
+    }
+    ui.weak("from the start of the axis to its end; lines: 95 % intervals; paler: forecast; hatched: unknown");
+}

@@ -1,0 +1,251 @@
+//! The sheet of the selected member: how it fares and how sure that is, where it is damaged, what
+//! that rests on, what is foretold, and the way to all that shows it. Of no member: the structure.
+
+mod bars;
+mod evidence;
+mod faces;
+mod links;
+mod overview;
+
+use bevy_ecs::prelude::*;
+use egui::{RichText, Ui};
+use intrados_damage::evidence::called;
+use intrados_mechanics::plugin::Analyses;
+use intrados_predict::{MemberPrediction, Predicted};
+use intrados_scene::{Member, Scene, plugin::CurrentScene};
+
+use crate::{
+    Action, Actions, Latest, Selection, colours,
+    number::{copied, plus_minus},
+};
+
+pub(crate) use evidence::Listing;
+
+/// Draws it.
+pub(crate) fn member(
+    InMut(ui): InMut<Ui>,
+    scene: Option<Res<CurrentScene>>,
+    latest: Res<Latest>,
+    selection: Res<Selection>,
+    analyses: Res<Analyses>,
+    mut listing: ResMut<Listing>,
+    mut actions: ResMut<Actions>,
+) {
+    let Some(scene) = scene else { return };
+    let scene = &scene.0;
+    let Some((index, member)) = selection.0.and_then(|i| Some((i, scene.members.get(i)?))) else {
+        overview::overview(ui, scene, &latest, &mut actions);
+        return;
+    };
+    head(ui, member);
+    // Above what grows while it is predicted: a button stays where it is.
+    ways(ui, scene, member, &mut actions);
+    standing(ui, index, &latest, &mut actions);
+    let result = latest.result_for(scene);
+    let told = result.and_then(|r| r.members.get(index));
+    if let Some(predicted) = latest.member(index) {
+        section(ui, "Damage along the member", |ui| bars::bars(ui, predicted));
+    }
+    if let Some(told) = told {
+        if !told.defects.is_empty() || !told.faces.is_empty() {
+            section(ui, "Faces and defects", |ui| faces::faces(ui, member, told));
+        }
+        section(ui, "What it rests on", |ui| sources(ui, told));
+    }
+    section(ui, "Evidence", |ui| {
+        listing.bypass_change_detection().show(ui, scene, member, result, &mut actions);
+    });
+    if let Some(told) = told {
+        section(ui, "Forecast", |ui| foretold(ui, told));
+    }
+    section(ui, "Capacity", |ui| capacity(ui, scene, member, told, &analyses, &mut actions));
+    section(ui, "Photographs, slices, gauges", |ui| {
+        links::links(ui, scene, member, told, &mut actions)
+    });
+}
+
+/// A part of the sheet under its name.
+fn section(ui: &mut Ui, name: &str, draw: impl FnOnce(&mut Ui)) {
+    ui.add_space(4.0);
+    egui::CollapsingHeader::new(RichText::new(name).strong())
+        .id_salt(name)
+        .default_open(true)
+        .show_unindented(ui, draw);
+}
+
+fn head(ui: &mut Ui, member: &Member) {
+    ui.label(RichText::new(&member.name).heading().strong());
+    let assumed = if member.concrete_assumed { " (assumed)" } else { "" };
+    let size = member.bounds[1] - member.bounds[0];
+    let kind = format!("{:?}", member.kind);
+    ui.weak(format!(
+        "{kind}, {}{assumed}, {:.2} × {:.2} × {:.2} m",
+        member.concrete, size.x, size.y, size.z
+    ));
+}
+
+/// Damage with its error, state with its probability, and what to do.
+fn standing(ui: &mut Ui, index: usize, latest: &Latest, actions: &mut Actions) {
+    let (Some(predicted), Some((verdict, steps))) = (latest.member(index), latest.state(index))
+    else {
+        ui.label("No evidence so far, which is not the same as sound.");
+        return;
+    };
+    if latest.is_outdated(index) {
+        outdated(ui, latest, actions);
+    }
+    let damage = plus_minus(predicted.damage.value, predicted.damage.std_error, "");
+    copied(ui, RichText::new(format!("d = {}", damage.trim())).size(18.0).strong());
+    ui.horizontal_wrapped(|ui| {
+        colours::severity(ui, verdict, steps);
+        ui.strong(&verdict.state);
+    });
+    probable(ui, predicted, latest);
+    let by = match verdict.within_months {
+        None => String::new(),
+        Some(0) => " (at once)".into(),
+        Some(1) => " (within a month)".into(),
+        Some(months) => format!(" (within {months} months)"),
+    };
+    ui.label(format!("{}{by}", verdict.advice));
+    if predicted.conflict {
+        ui.label("⚠ Pieces of evidence contradict each other.");
+    }
+}
+
+/// Says that numbers are of before the last change.
+pub(crate) fn outdated(ui: &mut Ui, latest: &Latest, actions: &mut Actions) {
+    ui.horizontal_wrapped(|ui| {
+        ui.colored_label(ui.visuals().warn_fg_color, "⚠ Outdated");
+        if latest.cancelled {
+            if ui.button("Predict again").clicked() {
+                actions.ask(Action::Predict);
+            }
+        } else {
+            ui.label("of before the last change; predicting again");
+        }
+    });
+}
+
+/// The probability of each state, from the best to the worst: a bar and a number.
+fn probable(ui: &mut Ui, predicted: &Predicted, latest: &Latest) {
+    let known = |state: &String| Some((state.clone(), *predicted.verdict.probability.get(state)?));
+    let states: Vec<(String, f64)> = latest.states().iter().filter_map(known).collect();
+    egui::Grid::new("probability").num_columns(3).spacing([8.0, 2.0]).show(ui, |ui| {
+        for (state, p) in states {
+            ui.label(&state);
+            let (rect, _) = ui.allocate_exact_size(egui::vec2(90.0, 9.0), egui::Sense::hover());
+            ui.painter().rect_filled(rect, 2.0, ui.visuals().extreme_bg_color);
+            let filled = rect.with_max_x(rect.left() + rect.width() * p.clamp(0.0, 1.0) as f32);
+            ui.painter().rect_filled(filled, 2.0, ui.visuals().selection.bg_fill);
+            ui.label(format!("{:.0} %", 100.0 * p));
+            ui.end_row();
+        }
+    });
+}
+
+/// Where to go from here.
+fn ways(ui: &mut Ui, scene: &Scene, member: &Member, actions: &mut Actions) {
+    ui.add_space(2.0);
+    ui.horizontal_wrapped(|ui| {
+        if ui.button("Look at it").on_hover_text("Fills the picture with it (F)").clicked() {
+            actions.ask(Action::Tab("Structure"));
+            actions.ask(Action::Frame);
+        }
+        if !member.slices.is_empty() && ui.button("Its slices").clicked() {
+            actions.ask(Action::Slice(0));
+        }
+        if scene.structure.assembly_of(&member.id).is_some() && ui.button("Its stress").clicked() {
+            actions.ask(Action::Tab("Stress"));
+        }
+        let attach = ui.button("Attach evidence…");
+        let hint = "Findings, CT slices, tables (A); or drop the files on the window";
+        if attach.on_hover_text(hint).clicked() {
+            actions.ask(Action::Fill(Vec::new()));
+        }
+    });
+}
+
+/// What each source says, and what contradicts what.
+fn sources(ui: &mut Ui, told: &MemberPrediction) {
+    if told.evidence.is_empty() {
+        ui.weak("Nothing that could be used.");
+    }
+    for (source, e) in &told.evidence {
+        ui.horizontal_wrapped(|ui| {
+            ui.strong(called(source));
+            copied(ui, RichText::new(format!("d = {}", plus_minus(e.damage, e.std_error, ""))));
+        });
+        ui.label(&e.basis);
+    }
+    for conflict in &told.conflicts {
+        ui.label(format!("⚠ contradicting: {conflict}"));
+    }
+}
+
+/// What its life by mechanics and rust says.
+fn foretold(ui: &mut Ui, told: &MemberPrediction) {
+    let Some(forecast) = told.evidence.get("forecast") else {
+        ui.weak("No forecast: nothing is known of its loads or its exposure.");
+        return;
+    };
+    let value = plus_minus(forecast.damage, forecast.std_error, "");
+    copied(ui, RichText::new(format!("d = {}", value.trim())));
+    ui.label(&forecast.basis);
+    let rust = forecast.details.get("rust");
+    let Some(rust) = rust else { return };
+    if let Some(why) = rust["why_not"].as_str() {
+        ui.weak(format!("Rust: {why}"));
+        return;
+    }
+    let number = |name: &str| rust[name].as_f64();
+    let begins = number("depassivation_years")
+        .map_or("not within a thousand years".into(), |y| format!("after {y:.0} years"));
+    let likely = number("probability_depassivated").unwrap_or(0.0);
+    ui.label(format!(
+        "Bars begin to rust {begins}, most probably; with {:.0} % they have by now.",
+        100.0 * likely
+    ));
+}
+
+/// What it bears, as far as anybody has computed it, and its widest crack against its limit.
+fn capacity(
+    ui: &mut Ui,
+    scene: &Scene,
+    member: &Member,
+    told: Option<&MemberPrediction>,
+    analyses: &Analyses,
+    actions: &mut Actions,
+) {
+    if let Some(c) = told.and_then(|t| t.crack_check.as_ref()) {
+        let verdict = if c.exceeded { "⚠ wider than" } else { "✔ within" };
+        ui.label(format!(
+            "widest crack {:.2} mm ({}), {verdict} the {} mm of {}",
+            c.width_mm,
+            called(c.source),
+            c.limit_mm,
+            c.exposure
+        ));
+    }
+    let Some(assembly) = scene.structure.assembly_of(&member.id) else {
+        ui.weak("Its body is known as a surface alone: no load can be put on it.");
+        return;
+    };
+    match analyses.get(&assembly.id).map(|a| a.work.is_running()) {
+        None => {
+            ui.horizontal_wrapped(|ui| {
+                ui.weak("Its stress has not been computed.");
+                if ui.link("Go to Stress").clicked() {
+                    actions.ask(Action::Tab("Stress"));
+                }
+            });
+        }
+        Some(true) => drop(ui.weak("Its stress is being computed.")),
+        Some(false) => {
+            if ui.link("Its stress is computed: look at it").clicked() {
+                actions.ask(Action::Tab("Stress"));
+            }
+        }
+    }
+    ui.weak("Its load at failure: `intrados analyze --to-failure`.");
+}

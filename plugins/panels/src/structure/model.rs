@@ -1,0 +1,471 @@
+//! The members in space, coloured by what is known of their zones so far, in daylight.
+
+use std::sync::Arc;
+
+use egui::{Align2, Color32, Rect, Sense, TextureHandle, TextureOptions, Ui, pos2, vec2};
+use glam::Vec3;
+use intrados_damage::{
+    verdict::Basis,
+    zone::{ZONES, place as place_of},
+};
+use intrados_report::surface::{Facet, facets};
+use intrados_scene::{Camera, Scene};
+use rayon::prelude::*;
+
+use crate::{
+    Action, Actions, Latest, Selection, colours,
+    number::plus_minus,
+    surface::{Drawn, Surface, bounds, draw, hand, place},
+};
+
+/// Added to values of members that are not the selected one: they are shown darker.
+const ASIDE: f32 = -10.0;
+/// Added to values that are only forecast: they are shown paler.
+const FORECAST: f32 = 3.0;
+/// Share of their brightness.
+const DARKER: f32 = 0.72;
+/// Faces that meet at a larger angle than this one's cosine have an edge between them.
+const EDGE: f32 = 0.86;
+/// Share of its brightness that a pixel on an edge keeps.
+const INK: f32 = 0.62;
+/// Most names of members in the picture.
+const MOST_NAMES: usize = 40;
+
+/// Width of the legend, points.
+const LEGEND: f32 = 92.0;
+
+/// What is remembered between frames.
+#[derive(Default)]
+pub(super) struct Model {
+    /// Hash of the scene that the facets are of.
+    of: String,
+    facets: Arc<Vec<Facet>>,
+    positions: Vec<Vec3>,
+    camera: Option<Camera>,
+    shown: Option<Shown>,
+}
+
+struct Shown {
+    key: Key,
+    drawn: Drawn,
+    texture: TextureHandle,
+}
+
+#[derive(Clone, PartialEq)]
+struct Key {
+    damage: Vec<[Option<f64>; ZONES]>,
+    forecast: Vec<[bool; ZONES]>,
+    selection: Selection,
+    camera: Camera,
+    size: [usize; 2],
+    over: usize,
+}
+
+impl Model {
+    /// Draws it into `rect`; gives what was drawn, for whoever saves it.
+    pub(super) fn show(
+        &mut self,
+        ui: &mut Ui,
+        rect: Rect,
+        scene: &Arc<Scene>,
+        latest: &Latest,
+        selection: Selection,
+        names: bool,
+        actions: &mut Actions,
+    ) {
+        self.adopt(scene);
+        ui.painter().rect_filled(rect, 0.0, ground(ui));
+        if self.facets.is_empty() {
+            let font = egui::TextStyle::Body.resolve(ui.style());
+            let text = "No member of this scene has a surface.";
+            let ink = ui.visuals().weak_text_color();
+            ui.painter().text(rect.center(), Align2::CENTER_CENTER, text, font, ink);
+            return;
+        }
+        let (width, height) = (rect.width().max(8.0) as u32, rect.height().max(8.0) as u32);
+        let response = ui.allocate_rect(rect, Sense::click_and_drag());
+        response.widget_info(|| {
+            egui::WidgetInfo::labeled(egui::Role::Image, true, "Damage of members")
+        });
+        let camera = match &self.camera {
+            Some(camera) => Camera { width, height, ..camera.clone() },
+            None => first(&self.positions, scene, [width, height]),
+        };
+        let before = camera.clone();
+        let camera = hand(ui, &response, rect, camera);
+        let is_moving = response.dragged() || camera != before;
+        self.camera = Some(camera.clone());
+        self.redraw(ui, rect, latest, selection, camera.clone(), is_moving);
+        let Some(shown) = &self.shown else { return };
+        let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
+        ui.painter().image(shown.texture.id(), rect, whole, Color32::WHITE);
+        if names {
+            self.names(ui, rect, scene, latest, selection, &camera);
+        }
+        legend(ui, rect);
+        scale(ui, rect, &camera);
+        let under = response.hover_pos().and_then(|at| {
+            let share = (at - rect.min) / rect.size();
+            self.facets.get(shown.drawn.face(share.x, share.y)? as usize).copied()
+        });
+        if response.clicked() {
+            actions.ask(Action::Select(under.map(|f| f.member)));
+        }
+        if response.double_clicked() {
+            actions.ask(Action::Frame);
+        }
+        if let Some(facet) = under {
+            response.on_hover_ui_at_pointer(|ui| said(ui, scene, latest, facet));
+        }
+    }
+
+    /// Takes the surfaces of another scene; the camera stays where it was in one that is like it.
+    fn adopt(&mut self, scene: &Arc<Scene>) {
+        if self.of == scene.hash {
+            return;
+        }
+        let facets = facets(scene);
+        let positions: Vec<Vec3> = facets.iter().flat_map(|f| f.corners).collect();
+        let is_alike = !positions.is_empty() && bounds(&positions) == bounds(&self.positions);
+        let camera = self.camera.take().filter(|_| is_alike);
+        let facets = Arc::new(facets);
+        *self = Self { of: scene.hash.clone(), facets, positions, camera, ..Self::default() };
+    }
+
+    /// Looks from another place, so that what is wanted fills the picture.
+    pub(super) fn go(&mut self, view: super::View, scene: &Scene, member: Option<usize>) {
+        let Some(camera) = &self.camera else { return };
+        let own = self.facets.iter().filter(|f| member.is_none_or(|m| f.member == m));
+        let points: Vec<Vec3> = own.flat_map(|f| f.corners).collect();
+        if points.is_empty() {
+            return;
+        }
+        let from = match view {
+            super::View::Framed => camera.position - camera.target,
+            super::View::Home => {
+                let home = first(&self.positions, scene, [camera.width, camera.height]);
+                home.position - home.target
+            }
+            super::View::Along(axis) => axis,
+        };
+        let placed = Camera { position: from, target: Vec3::ZERO, ..camera.clone() };
+        self.camera = Some(placed.framing(bounds(&points)));
+    }
+
+    /// What members are called and how they fare, the worst first where names would overlap.
+    fn names(
+        &self,
+        ui: &Ui,
+        rect: Rect,
+        scene: &Scene,
+        latest: &Latest,
+        selection: Selection,
+        camera: &Camera,
+    ) {
+        let font = egui::TextStyle::Small.resolve(ui.style());
+        let painter = ui.painter().with_clip_rect(rect);
+        let worth = |i: usize| {
+            let damage = latest.member(i).map_or(-1.0, |p| p.damage.value);
+            if selection.0 == Some(i) { 2.0 } else { damage }
+        };
+        let mut order: Vec<usize> = (0..scene.members.len()).collect();
+        order.sort_by(|a, b| worth(*b).total_cmp(&worth(*a)));
+        let mut taken: Vec<Rect> = Vec::new();
+        for index in order {
+            if taken.len() >= MOST_NAMES {
+                break;
+            }
+            let Some(middle) = self.middle(index) else { continue };
+            let at = place(camera, rect, middle);
+            let text = match latest.member(index) {
+                Some(p) => format!("{}  {:.2}", scene.members[index].name, p.damage.value),
+                None => format!("{}  ?", scene.members[index].name),
+            };
+            let ink = Color32::from_gray(245);
+            let galley = painter.layout_no_wrap(text, font.clone(), ink);
+            let area = Rect::from_center_size(at, galley.size() + vec2(8.0, 3.0));
+            let is_seen = (middle - camera.position).dot(camera.target - camera.position) > 0.0;
+            if !is_seen || !rect.contains_rect(area) || taken.iter().any(|t| t.intersects(area)) {
+                continue;
+            }
+            let back = Color32::from_black_alpha(170);
+            painter.rect_filled(area, 3.0, back);
+            if selection.0 == Some(index) {
+                let stroke = (1.5, colours::SELECTED);
+                painter.rect_stroke(area, 3.0, stroke, egui::StrokeKind::Outside);
+            }
+            painter.galley(area.min + vec2(4.0, 1.5), galley, ink);
+            taken.push(area);
+        }
+    }
+
+    fn middle(&self, member: usize) -> Option<Vec3> {
+        let own = self.facets.iter().filter(|f| f.member == member);
+        let points: Vec<Vec3> = own.flat_map(|f| f.corners).collect();
+        let [low, high] = bounds(&points);
+        (!points.is_empty()).then(|| 0.5 * (low + high))
+    }
+
+    fn redraw(
+        &mut self,
+        ui: &Ui,
+        rect: Rect,
+        latest: &Latest,
+        selection: Selection,
+        camera: Camera,
+        held: bool,
+    ) {
+        let members = self.facets.iter().map(|f| f.member + 1).max().unwrap_or(0);
+        let zones = |member: usize| {
+            latest.member(member).map_or([None; ZONES], |p| p.zones.0.map(|r| r.map(|r| r.value)))
+        };
+        let density = ui.ctx().pixels_per_point();
+        let size =
+            [rect.width() * density, rect.height() * density].map(|n| (n as usize).clamp(8, 4096));
+        // Fine when nobody moves it.
+        let forecast = |member: usize| {
+            latest.member(member).map_or([false; ZONES], |p| p.basis.map(|b| b == Basis::Forecast))
+        };
+        let forecast = (0..members).map(forecast).collect();
+        let key = Key {
+            damage: (0..members).map(zones).collect(),
+            forecast,
+            selection,
+            camera,
+            size,
+            over: if held { 1 } else { 2 },
+        };
+        if self.shown.as_ref().is_some_and(|s| s.key == key) {
+            return;
+        }
+        let value = |f: &Facet| {
+            let damage = key.damage[f.member][f.zone].map_or(f32::NAN, |d| d as f32);
+            let damage = if key.forecast[f.member][f.zone] { damage + FORECAST } else { damage };
+            if selection.0.is_some_and(|s| s != f.member) { damage + ASIDE } else { damage }
+        };
+        let values: Vec<f32> = self.facets.iter().flat_map(|f| [value(f); 3]).collect();
+        let faces: Vec<[u32; 4]> = (0..self.facets.len() as u32)
+            .map(|i| [3 * i, 3 * i + 1, 3 * i + 2, 3 * i + 2])
+            .collect();
+        let surface = Surface {
+            positions: &self.positions,
+            values: &values,
+            faces: &faces,
+            mesh: false,
+            sun: Some(sun(&key.camera)),
+        };
+        let mut drawn = draw(&key.camera, key.size, key.over, &surface, colour);
+        ink(&mut drawn, &self.facets, selection);
+        let texture = match self.shown.take() {
+            Some(mut before) => {
+                before.texture.set(drawn.image.clone(), TextureOptions::LINEAR);
+                before.texture
+            }
+            None => ui.ctx().load_texture("damage", drawn.image.clone(), TextureOptions::LINEAR),
+        };
+        self.shown = Some(Shown { key, drawn, texture });
+    }
+}
+
+/// What is behind the structure: what is sound is pale, what is damaged dark, and both are to be
+/// seen on it.
+pub(super) fn ground(ui: &Ui) -> Color32 {
+    if ui.visuals().dark_mode {
+        Color32::from_rgb(34, 38, 44)
+    } else {
+        Color32::from_rgb(176, 184, 193)
+    }
+}
+
+/// Towards the sun, which goes along with the eye: over its left shoulder.
+fn sun(camera: &Camera) -> Vec3 {
+    let [right, up, forward] = camera.frame();
+    (0.75 * up - 0.65 * right - 0.6 * forward).normalize_or(Vec3::Y)
+}
+
+/// Edges between faces in a darker tone, and the rim of the selected member.
+fn ink(drawn: &mut Drawn, facets: &[Facet], selection: Selection) {
+    let [w, h] = drawn.size;
+    let face = |i: u32| facets.get(i as usize);
+    let normals: Vec<Vec3> = facets
+        .iter()
+        .map(|f| (f.corners[1] - f.corners[0]).cross(f.corners[2] - f.corners[0]))
+        .map(Vec3::normalize_or_zero)
+        .collect();
+    let faces = drawn.faces();
+    let differs = |a: u32, b: u32| match (face(a), face(b)) {
+        (Some(fa), Some(fb)) => {
+            fa.member != fb.member || normals[a as usize].dot(normals[b as usize]).abs() < EDGE
+        }
+        (None, None) => false,
+        _ => true,
+    };
+    let is_selected = |i: u32| selection.0.is_some() && face(i).map(|f| f.member) == selection.0;
+    let marks: Vec<(usize, bool)> = (0..w * h)
+        .into_par_iter()
+        .filter_map(|at| {
+            let (x, y) = (at % w, at / w);
+            let own = faces[at];
+            let mut is_edge = false;
+            let mut is_rim = false;
+            for (there, next) in [(x + 1 < w, at + 1), (y + 1 < h, at + w)] {
+                if there && faces[next] != own {
+                    is_edge |= differs(own, faces[next]);
+                    is_rim |= is_selected(own) != is_selected(faces[next]);
+                }
+            }
+            is_edge.then_some((at, is_rim))
+        })
+        .collect();
+    for (at, is_rim) in marks {
+        let pixel = &mut drawn.image.pixels[at];
+        if is_rim {
+            // Two pixels wide, so that it is seen where pixels are small.
+            *pixel = colours::SELECTED;
+            for next in [at + 1, at + w] {
+                if let Some(pixel) = drawn.image.pixels.get_mut(next) {
+                    *pixel = colours::SELECTED;
+                }
+            }
+        } else {
+            let [r, g, b, a] = pixel.to_array();
+            let dark = |c: u8| (f32::from(c) * INK) as u8;
+            *pixel = Color32::from_rgba_premultiplied(dark(r), dark(g), dark(b), a);
+        }
+    }
+}
+
+/// From the scene's own camera's side, so that all members are seen.
+fn first(positions: &[Vec3], scene: &Scene, [width, height]: [u32; 2]) -> Camera {
+    let (low_high, theirs) = (bounds(positions), scene.cameras.first());
+    let position = theirs.map_or(Vec3::new(0.9, 0.45, 1.1), |c| c.position - c.target);
+    let camera = Camera {
+        name: "structure".into(),
+        position,
+        target: Vec3::ZERO,
+        up: Vec3::Y,
+        fov_deg: 32.0,
+        width,
+        height,
+        exposure: 0.0,
+        lens: None,
+    };
+    camera.framing(low_high)
+}
+
+fn colour(value: f32) -> [u8; 3] {
+    let (value, dim) = if value < 0.5 * ASIDE { (value - ASIDE, DARKER) } else { (value, 1.0) };
+    let (value, is_forecast) =
+        if value > 0.5 * FORECAST { (value - FORECAST, true) } else { (value, false) };
+    colours::damage(value, is_forecast).map(|c| (f32::from(c) * dim) as u8)
+}
+
+fn said(ui: &mut Ui, scene: &Scene, latest: &Latest, facet: Facet) {
+    let Some(member) = scene.members.get(facet.member) else { return };
+    ui.strong(&member.name);
+    let zone = latest.member(facet.member).and_then(|p| p.zones.0[facet.zone]);
+    match zone {
+        Some(r) => {
+            let basis = latest.member(facet.member).map_or("", |p| p.basis[facet.zone].name());
+            ui.label(format!(
+                "{} of the axis: d = {}, {basis}",
+                place_of(facet.zone),
+                plus_minus(r.value, r.std_error, "")
+            ))
+        }
+        None => ui.weak("Nothing is known of it yet; that is not the same as sound."),
+    };
+}
+
+/// A length in the picture, at the distance of its middle: nearer things are larger.
+fn scale(ui: &Ui, rect: Rect, camera: &Camera) {
+    let distance = (camera.target - camera.position).length();
+    let width = 2.0 * camera.half_extent()[0] * distance;
+    let metre = rect.width() / width.max(1e-6);
+    // The largest round length that takes less than a fifth of the picture.
+    let most = 0.2 * rect.width() / metre;
+    let power = 10_f32.powf(most.log10().floor());
+    let length = [5.0, 2.0, 1.0].map(|k| k * power).into_iter().find(|l| *l <= most);
+    let Some(length) = length.filter(|l| l.is_finite()) else { return };
+    let text = if length < 1.0 {
+        format!("{:.0} mm at the middle", 1e3 * length)
+    } else {
+        format!("{length:.0} m at the middle")
+    };
+    let ink = ui.visuals().text_color();
+    let left = rect.left_bottom() + vec2(14.0, -14.0);
+    let right = left + vec2(length * metre, 0.0);
+    let painter = ui.painter().with_clip_rect(rect);
+    painter.line_segment([left, right], (2.0, ink));
+    for end in [left, right] {
+        painter.line_segment([end - vec2(0.0, 5.0), end + vec2(0.0, 5.0)], (2.0, ink));
+    }
+    let font = egui::TextStyle::Small.resolve(ui.style());
+    painter.text(left - vec2(0.0, 8.0), Align2::LEFT_BOTTOM, text, font, ink);
+}
+
+/// Colours with their damages, and what has none.
+pub(super) fn legend(ui: &Ui, rect: Rect) {
+    const STEPS: usize = 48;
+    let height = (rect.height() * 0.28).clamp(50.0, 220.0);
+    let back = Rect::from_min_size(
+        pos2(rect.right() - LEGEND - 6.0, rect.bottom() - height - 84.0),
+        vec2(LEGEND, height + 78.0),
+    );
+    let painter = ui.painter().with_clip_rect(rect);
+    painter.rect_filled(back, 4.0, ui.visuals().panel_fill.gamma_multiply(0.88));
+    let bar = Rect::from_min_size(back.min + vec2(14.0, 30.0), vec2(14.0, height));
+    let y = |share: f32| bar.bottom() - bar.height() * share;
+    for k in 0..STEPS {
+        let [from, to] = [k, k + 1].map(|k| k as f32 / STEPS as f32);
+        painter.rect_filled(
+            Rect::from_min_max(pos2(bar.left(), y(to)), pos2(bar.right(), y(from) + 0.5)),
+            0.0,
+            colours::damage_ink(0.5 * (from + to), false),
+        );
+    }
+    let (font, ink) = (egui::TextStyle::Small.resolve(ui.style()), ui.visuals().text_color());
+    let write = |at: egui::Pos2, align: Align2, text: &str| {
+        painter.text(at, align, text, font.clone(), ink);
+    };
+    for tick in [0.0, 0.25, 0.5, 0.75, 1.0] {
+        let at = pos2(bar.right() + 5.0, y(tick));
+        let word = match tick {
+            0.0 => "0 sound".to_owned(),
+            1.0 => "1 lost".to_owned(),
+            _ => format!("{tick}"),
+        };
+        write(at, Align2::LEFT_CENTER, &word);
+    }
+    write(back.min + vec2(8.0, 6.0), Align2::LEFT_TOP, "damage d");
+    let mut patch = Rect::from_min_size(bar.left_bottom() + vec2(0.0, 10.0), vec2(14.0, 10.0));
+    for (colour, word) in [
+        (colours::damage_ink(f32::NAN, false), "unknown"),
+        (colours::damage_ink(0.25, true), "forecast"),
+    ] {
+        painter.rect_filled(patch, 0.0, colour);
+        write(patch.right_center() + vec2(5.0, 0.0), Align2::LEFT_CENTER, word);
+        patch = patch.translate(vec2(0.0, 15.0));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn who_is_not_selected_is_darker_and_who_is_unknown_is_grey() {
+        let (bright, dim) = (colour(0.7), colour(0.7 + ASIDE));
+        assert!(bright.iter().zip(dim).all(|(b, d)| d <= *b) && bright != dim);
+        let greyness = |rgb: [u8; 3]| rgb.iter().max().unwrap() - rgb.iter().min().unwrap();
+        for damage in [0.0, 0.5, 1.0] {
+            let (measured, forecast) = (colour(damage), colour(damage + FORECAST));
+            assert!(
+                greyness(forecast) < greyness(measured) && greyness(forecast) > 0,
+                "{measured:?} {forecast:?}"
+            );
+        }
+        let [r, g, b] = colour(f32::NAN);
+        assert!(r == g && g == b);
+    }
+}

@@ -1,0 +1,227 @@
+//! Changes of evidence that can be taken back and made again: the text before and after, and the
+//! copies that lay beside the scene in one of the two.
+
+use std::{
+    fs, io,
+    path::{Path, PathBuf},
+};
+
+use intrados_stage::Job;
+use tempfile::TempDir;
+
+use super::{AttachError, Detached, Project, lock::Lock, text_of, write};
+
+/// A change that was made.
+#[derive(Debug)]
+pub struct Change {
+    folder: PathBuf,
+    evidence: PathBuf,
+    /// The text without it and with it; none: there is no file.
+    texts: [Option<String>; 2],
+    copies: Vec<PathBuf>,
+    /// Whether the copies are there with it, or without it.
+    adds: bool,
+    /// Where the copies lie while they are not there, by their number.
+    kept: TempDir,
+    is_made: bool,
+}
+
+impl Change {
+    /// What [`Proposal::commit`](super::Proposal::commit) has made of a project; `copies` are those
+    /// that it gave.
+    ///
+    /// # Errors
+    /// The evidence cannot be read again, or nothing can be kept aside.
+    pub fn attached(project: &Project, copies: Vec<PathBuf>) -> Result<Self, AttachError> {
+        Self::of(project, copies, true, kept(&project.folder)?)
+    }
+
+    fn of(
+        project: &Project,
+        copies: Vec<PathBuf>,
+        adds: bool,
+        kept: TempDir,
+    ) -> Result<Self, AttachError> {
+        let evidence = project.evidence();
+        let texts = [project.text.clone(), text_of(&evidence)?];
+        let folder = project.folder.clone();
+        Ok(Self { folder, evidence, texts, copies, adds, kept, is_made: true })
+    }
+
+    /// Whether it is made now, or taken back.
+    #[must_use]
+    pub fn is_made(&self) -> bool {
+        self.is_made
+    }
+
+    /// Takes it back, or makes it again: the evidence is the same to the byte as it was then.
+    ///
+    /// # Errors
+    /// Somebody has changed the evidence since, or it cannot be written; then nothing has changed.
+    pub fn turn(&mut self, job: &Job) -> Result<(), AttachError> {
+        let _lock = Lock::take(&self.folder, job)?;
+        let [without, with] = &self.texts;
+        let (from, to) = if self.is_made { (with, without) } else { (without, with) };
+        if text_of(&self.evidence)? != *from {
+            let why = "has been changed since: what came before that cannot be taken back";
+            return Err(AttachError::CannotWrite(format!("{}: {why}", self.evidence.display())));
+        }
+        let are_there = self.is_made == self.adds;
+        for (number, copy) in self.copies.iter().enumerate() {
+            let aside = self.kept.path().join(number.to_string());
+            let (from, to) = if are_there { (copy, &aside) } else { (&aside, copy) };
+            bring(from, to)?;
+        }
+        match to {
+            Some(text) => write(&self.evidence, text)?,
+            None => fs::remove_file(&self.evidence)
+                .map_err(|e| AttachError::write(&self.evidence, &e))?,
+        }
+        self.is_made = !self.is_made;
+        if are_there {
+            clear(&self.copies, &self.folder)?;
+        }
+        Ok(())
+    }
+}
+
+impl Project {
+    /// The same as [`Project::detach`], so that it can be taken back.
+    ///
+    /// # Errors
+    /// As of [`Project::detach`], or what is taken away cannot be kept aside.
+    pub fn detach_for_now(
+        &self,
+        member: &str,
+        name: &str,
+        job: &Job,
+    ) -> Result<(Detached, Change), AttachError> {
+        let (.., files) = self.find(member, name)?;
+        let copies = self.copies(&files, &super::EvidenceFile::default());
+        let kept = kept(&self.folder)?;
+        for (number, copy) in copies.iter().enumerate() {
+            job.step(number, copies.len()).map_err(crate::LoadError::from)?;
+            bring(copy, &kept.path().join(number.to_string()))?;
+        }
+        let detached = self.detach(member, name, job)?;
+        let change = Change::of(self, copies, false, kept)?;
+        Ok((detached, change))
+    }
+}
+
+fn kept(folder: &Path) -> Result<TempDir, AttachError> {
+    tempfile::tempdir().map_err(|e| AttachError::write(folder, &e))
+}
+
+/// Copies a file, its folder with it.
+fn bring(from: &Path, to: &Path) -> Result<(), AttachError> {
+    let failed = |e: io::Error| AttachError::write(to, &e);
+    to.parent().map_or(Ok(()), fs::create_dir_all).map_err(failed)?;
+    fs::copy(from, to).map(drop).map_err(failed)
+}
+
+/// Removes files, and the folders that are empty then, up to `top`.
+pub(super) fn clear(files: &[PathBuf], top: &Path) -> Result<(), AttachError> {
+    for file in files {
+        fs::remove_file(file).map_err(|e| AttachError::write(file, &e))?;
+    }
+    for folder in files.first().and_then(|f| f.parent()).into_iter().flat_map(Path::ancestors) {
+        // Folders that hold something else stay.
+        if folder == top || fs::remove_dir(folder).is_err() {
+            break;
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use intrados_stage::Access;
+
+    use super::*;
+    use crate::attach::{Attachment, Finding, What};
+
+    const SCENE: &str = r#"(
+    schema: "intrados.scene/1",
+    materials: [(name: "concrete", colour: (0.5, 0.5, 0.5))],
+    members: [(
+        id: "C1", name: "Column 1", at: (0, 0, 0), concrete: "C30/37", material: "concrete",
+        body: Column(section: Rectangle(width_m: 0.4, depth_m: 0.4), height_m: 3),
+    )],
+    lamps: [Environment(name: "sky", radiance: (1, 1, 1))],
+    cameras: [(name: "front", position: (2, 2, 5), target: (0, 1, 0), fov_deg: 40, width: 9, height: 9)],
+)"#;
+
+    /// All files of a folder with their bytes.
+    fn all(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
+        let mut files = Vec::new();
+        let mut todo = vec![folder.to_owned()];
+        while let Some(folder) = todo.pop() {
+            for entry in fs::read_dir(folder).unwrap() {
+                let path = entry.unwrap().path();
+                match path.is_dir() {
+                    true => todo.push(path),
+                    false => files.push((path.clone(), fs::read(path).unwrap())),
+                }
+            }
+        }
+        files.sort();
+        files
+    }
+
+    fn spall(picture: PathBuf) -> Attachment {
+        let what = What::Finding(Finding::Rust { area_m2: 0.02 });
+        Attachment {
+            member: "C1".into(),
+            name: Some("stain".into()),
+            date: None,
+            along: Some([0.4, 0.5]),
+            face: None,
+            angle_deg: None,
+            height_m: None,
+            instrument: None,
+            picture: Some(picture),
+            what,
+        }
+    }
+
+    #[test]
+    fn what_is_taken_back_was_never_there_and_comes_again() {
+        let folder = tempfile::tempdir().unwrap();
+        let project = folder.path().join("bridge");
+        fs::create_dir(&project).unwrap();
+        fs::write(project.join("scene.ron"), SCENE).unwrap();
+        let picture = folder.path().join("stain.png");
+        image::GrayImage::new(4, 4).save(&picture).unwrap();
+        let (access, job) = (Access::default(), Job::default());
+        let untouched = all(&project);
+        let open = || Project::edit(&project, &access, &job).unwrap();
+        let mut attached = {
+            let project = open();
+            let copies = project.propose(&spall(picture), &job).unwrap().commit().unwrap();
+            assert_eq!(copies.len(), 1);
+            Change::attached(&project, copies).unwrap()
+        };
+        let with = all(&project);
+        assert_eq!(with.len(), 3);
+        attached.turn(&job).unwrap();
+        assert_eq!(all(&project), untouched);
+        assert!(!project.join("evidence").exists());
+        attached.turn(&job).unwrap();
+        assert_eq!(all(&project), with);
+        let (_, mut detached) = open().detach_for_now("C1", "stain", &job).unwrap();
+        let without = all(&project);
+        assert_eq!(without.len(), 2, "the evidence without an item, and no copy");
+        detached.turn(&job).unwrap();
+        assert_eq!(all(&project), with);
+        detached.turn(&job).unwrap();
+        assert_eq!(all(&project), without);
+        // What somebody else has written is not thrown away.
+        let evidence = project.join("evidence.ron");
+        let text = fs::read_to_string(&evidence).unwrap() + "// mine\n";
+        fs::write(&evidence, &text).unwrap();
+        let why = detached.turn(&job).unwrap_err().to_string();
+        assert!(why.contains("has been changed since"), "{why}");
+        assert_eq!(fs::read_to_string(&evidence).unwrap(), text);
+    }
+}
