@@ -455,7 +455,7 @@ mod tests {
         let line = [0.0, 1.0, 2.0].map(|x| DVec3::new(x, 0.0, 0.0)).to_vec();
         let air = [1.2033, 1.2073];
         let is_in = |p: DVec3| !(air[0]..air[1]).contains(&p.x);
-        assert_eq!(inside(&line, is_in), [line.clone()]);
+        assert_eq!(inside(&line, is_in), vec![line.clone()]);
         let leaves = |run: &[DVec3]| {
             let (from, to) = (run[0].x, run[run.len() - 1].x);
             (from < air[1] && to > air[0]).then(|| (air[0] - from).max(0.0))
