@@ -52,7 +52,7 @@ def test_what_is_no_slice_is_refused():
         intrados.detect(image)
     with pytest.raises(intrados.InputError, match="no body found"):
         intrados.detect(np.zeros((32, 32)), mm_per_pixel=0.1)
-    with pytest.raises(intrados.MissingError, match="no such file"):
+    with pytest.raises(intrados.MissingError, match="nowhere.tif: No such file"):
         intrados.detect("nowhere.tif")
 
 

@@ -3,7 +3,7 @@
 >>> import intrados
 >>> scene = intrados.load("room")
 >>> scene.meters
-('desk', 'floor', 'wall')
+('floor', 'under the ceiling')
 """
 
 from ._detect import Crack, Pore, Slice, detect

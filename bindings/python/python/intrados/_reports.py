@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import json
 import pathlib
-import tempfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -21,9 +20,8 @@ Progress = Callable[[float, str], object]
 class Report:
     """What a command answered."""
 
-    def __init__(self, text: str, folder: tempfile.TemporaryDirectory | None = None) -> None:
+    def __init__(self, text: str) -> None:
         self._text = text
-        self._folder = folder
 
     def json(self) -> str:
         """What the command prints with ``--format json``, to the bit."""

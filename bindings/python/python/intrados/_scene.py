@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import tempfile
+import weakref
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
@@ -157,9 +159,16 @@ class Scene:
         return self._with_files(Analysis, "analyze", options, {}, out, progress)
 
     def _with_files(self, kind, command, options, flags, out, progress):
-        folder = None if out is not None else tempfile.TemporaryDirectory(prefix="intrados-")
-        options = options | {"out": folder.name if folder else out}
-        return kind(self._told(command, options, flags, progress), folder)
+        folder = None if out is not None else tempfile.mkdtemp(prefix="intrados-")
+        try:
+            report = kind(self._told(command, options | {"out": folder or out}, flags, progress))
+        except BaseException:
+            if folder:
+                shutil.rmtree(folder, ignore_errors=True)
+            raise
+        if folder:
+            weakref.finalize(report, shutil.rmtree, folder, ignore_errors=True)
+        return report
 
     def _told(self, command: str, options: dict, flags: dict[str, bool], progress: Progress | None) -> str:
         words = [command, *_words(options, flags), "--", self._path]
