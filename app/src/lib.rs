@@ -25,6 +25,7 @@ mod console;
 #[cfg(feature = "desktop")]
 pub mod desktop;
 mod drive;
+pub mod embedded;
 mod failure;
 mod output;
 mod picture;

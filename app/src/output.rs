@@ -11,21 +11,27 @@ use std::{
 use intrados_stage::file::{self, Set};
 use serde::Serialize;
 
-use crate::{args::Format, failure::Failure, session::Session};
+use crate::{
+    args::Format,
+    failure::Failure,
+    session::{Listener, Session},
+};
 
 impl Session {
-    /// Prints the result of a command: JSON as it is, or the table made of it.
+    /// Gives the result of a command to whoever listens: JSON as it is, or the table made of it.
     pub(crate) fn print(
         &self,
         result: &impl Serialize,
         table: impl FnOnce() -> String,
     ) -> Result<(), Failure> {
-        if !self.prints() {
-            return Ok(());
-        }
-        match self.format {
-            Format::Table => say(&table()),
-            Format::Json => say(&json(result)?),
+        match (&self.listener, self.format) {
+            (Listener::Files, _) => Ok(()),
+            (Listener::Caller(answer), _) => {
+                *answer.lock().unwrap_or_else(PoisonError::into_inner) = json(result)?;
+                Ok(())
+            }
+            (Listener::User, Format::Table) => say(&table()),
+            (Listener::User, Format::Json) => say(&json(result)?),
         }
     }
 }
@@ -117,6 +123,11 @@ pub(crate) fn in_shared_parts<T>(
         Err(refused @ (Failure::Usage(_) | Failure::BadInput(_) | Failure::NoInput(_))) => {
             locked(&shared).forget();
             Err(refused)
+        }
+        // Another program's file does not tell which build of ours is in it.
+        Err(broken_off) if session.is_embedded() => {
+            locked(&shared).forget();
+            Err(broken_off)
         }
         Err(broken_off) => {
             let parts = locked(&shared).parts();

@@ -1,16 +1,33 @@
 //! Whether this processor knows the instructions that the program is made of.
 
-/// Ends the program with one line where the processor is older than what it was compiled for,
-/// instead of an illegal instruction somewhere within the work.
+/// What a processor is told that is older than what the program was compiled for.
+pub(crate) const TOO_OLD: &str = "this processor has no AVX2, for which the program was compiled (x86-64-v3: Intel since 2013, AMD since 2015). \
+Compile it for this machine: RUSTFLAGS=\"-C target-cpu=native\" cargo build --release";
+
+/// Ends the program with one line where the processor is too old, instead of an illegal instruction
+/// somewhere within the work.
+#[inline(never)]
+pub(crate) fn check() {
+    if !is_known() {
+        use std::io::Write;
+        let mut out = std::io::stderr();
+        for part in ["intrados: ", TOO_OLD, "\n"] {
+            let _ = out.write_all(part.as_bytes());
+        }
+        std::process::exit(1);
+    }
+}
+
+/// Whether the processor knows all instructions that may be asked of it.
 ///
 /// `is_x86_feature_detected!` is a constant in a program that is compiled for the feature, so this
 /// asks CPUID itself. It must come before anything that the compiler may have vectorised, and makes
 /// do with plain integers and code of the standard library, which runs on every x86-64.
 #[inline(never)]
-pub(crate) fn check() {
+pub(crate) fn is_known() -> bool {
     #[cfg(all(target_arch = "x86_64", target_feature = "avx2"))]
     {
-        use std::{arch::x86_64::__cpuid_count, io::Write};
+        use std::arch::x86_64::__cpuid_count;
         let leaf = |leaf| {
             if __cpuid_count(leaf & 0x8000_0000, 0).eax < leaf {
                 None
@@ -23,14 +40,10 @@ pub(crate) fn check() {
             leaf(7).map_or(0, |l| l.ebx),
             leaf(0x8000_0001).map_or(0, |l| l.ecx),
         ];
-        if !is_v3(basic, further, extended) {
-            let message =
-                b"intrados: this processor has no AVX2, for which the program was compiled (x86-64-v3: Intel since 2013, AMD since 2015). \
-                Compile it for this machine: RUSTFLAGS=\"-C target-cpu=native\" cargo build --release\n";
-            let _ = std::io::stderr().write_all(message);
-            std::process::exit(1);
-        }
+        is_v3(basic, further, extended)
     }
+    #[cfg(not(all(target_arch = "x86_64", target_feature = "avx2")))]
+    true
 }
 
 /// Whether CPUID's leaves 1 (ECX), 7 (EBX) and 8000 0001h (ECX) have all of level x86-64-v3 (System

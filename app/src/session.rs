@@ -1,12 +1,15 @@
 //! What every command needs: how to speak, the job that a signal cancels, threads, logs.
 
 use std::{
+    ffi::OsString,
     fmt::Display,
     io::IsTerminal,
     panic::{AssertUnwindSafe, catch_unwind},
     process::ExitCode,
+    sync::{Arc, Mutex},
 };
 
+use intrados_scene::Scene;
 use intrados_stage::{Access, Job};
 use tracing_subscriber::EnvFilter;
 
@@ -27,9 +30,23 @@ pub(crate) struct Session {
     pub(crate) access: Access,
     /// Makes the app that predicts or that the window shows.
     pub(crate) build: Build,
+    /// The command, word by word, as a report quotes it.
+    pub(crate) words: Vec<OsString>,
+    /// A scene that who runs the command has loaded already.
+    pub(crate) given: Option<Arc<Scene>>,
+    pub(crate) listener: Listener,
     quiet: bool,
-    /// Whether results are kept off stdout: another command runs this one and reads its files.
-    mute: bool,
+}
+
+/// Who hears the result of a command.
+#[derive(Debug, Clone)]
+pub(crate) enum Listener {
+    /// Whoever reads stdout.
+    User,
+    /// Another command, which reads the files of this one.
+    Files,
+    /// Another program that runs the command within itself: JSON.
+    Caller(Arc<Mutex<String>>),
 }
 
 impl Session {
@@ -40,14 +57,36 @@ impl Session {
             job: self.job.clone(),
             access: self.access.clone(),
             build: Build::clone(&self.build),
+            words: self.words.clone(),
+            given: None,
+            listener: Listener::Files,
             quiet: true,
-            mute: true,
         }
     }
 
-    /// Whether results go to stdout.
-    pub(crate) fn prints(&self) -> bool {
-        !self.mute
+    /// For a program that runs a command within itself and shows the job's progress its own way.
+    pub(crate) fn embedded(
+        common: &Common,
+        job: &Job,
+        words: Vec<OsString>,
+        given: Option<Arc<Scene>>,
+        answer: &Arc<Mutex<String>>,
+    ) -> Self {
+        Self {
+            format: Format::Json,
+            job: job.clone(),
+            access: Access::new(common.allow.clone()),
+            build: Arc::new(crate::simulation),
+            words,
+            given,
+            listener: Listener::Caller(Arc::clone(answer)),
+            quiet: true,
+        }
+    }
+
+    /// Whether this is a command within another program.
+    pub(crate) fn is_embedded(&self) -> bool {
+        matches!(self.listener, Listener::Caller(_))
     }
 
     /// A line for the user on stderr, unless it is to be quiet.
@@ -81,8 +120,10 @@ pub(crate) fn run(
         job: Job::new("starting"),
         access: Access::new(common.allow.clone()),
         build,
+        words: std::env::args_os().collect(),
+        given: None,
+        listener: Listener::User,
         quiet: common.quiet,
-        mute: false,
     };
     let result = catch_unwind(AssertUnwindSafe(|| {
         start_threads(common)?;

@@ -57,7 +57,7 @@ pub(crate) fn run(session: &Session, args: &args::Predict) -> Result<Outcome, Fa
         let (prediction, lit) = predicted(session, scene, settings.clone(), parts)?;
         let _progress = session.watch("the report");
         let record = Record {
-            command: command(std::env::args_os()),
+            command: command(&session.words),
             samples: args.spp,
             seed: args.seed,
             ifc: args.ifc.clone(),
@@ -169,9 +169,9 @@ fn profile(scene: &Scene, asked: Option<&Path>) -> Result<Profile, Failure> {
 }
 
 /// A command as a shell takes it again. What is no text in it cannot be shown as it is.
-fn command(words: impl Iterator<Item = OsString>) -> String {
+fn command(words: &[OsString]) -> String {
     let plain = |c: char| c.is_alphanumeric() || "-_./=,:+@%".contains(c);
-    let word = |word: OsString| {
+    let word = |word: &OsString| {
         let word = word.to_string_lossy().into_owned();
         if !word.is_empty() && word.chars().all(plain) {
             word
@@ -179,7 +179,7 @@ fn command(words: impl Iterator<Item = OsString>) -> String {
             format!("'{}'", word.replace('\'', r"'\''"))
         }
     };
-    words.map(word).collect::<Vec<_>>().join(" ")
+    words.iter().map(word).collect::<Vec<_>>().join(" ")
 }
 
 fn table(document: &Document) -> String {
@@ -247,16 +247,13 @@ mod tests {
     fn a_command_can_be_given_again() {
         let words = ["intrados", "predict", "Brücke.ron", "--out", "two words", "it's", ""]
             .map(OsString::from);
-        assert_eq!(
-            command(words.into_iter()),
-            r"intrados predict Brücke.ron --out 'two words' 'it'\''s' ''"
-        );
+        assert_eq!(command(&words), r"intrados predict Brücke.ron --out 'two words' 'it'\''s' ''");
     }
 
     #[cfg(unix)]
     #[test]
     fn words_need_not_be_text() {
         use std::os::unix::ffi::OsStringExt;
-        assert_eq!(command([OsString::from_vec(vec![b'a', 0xff])].into_iter()), "'a\u{fffd}'");
+        assert_eq!(command(&[OsString::from_vec(vec![b'a', 0xff])]), "'a\u{fffd}'");
     }
 }

@@ -27,8 +27,11 @@ pub(crate) struct Opened {
     pub(crate) setup_cpu_seconds: f64,
 }
 
-/// Loads a scene; its warnings go to the log.
+/// Loads a scene, or takes the one that is given; its warnings go to the log.
 pub(crate) fn load(session: &Session, path: &Path) -> Result<Scene, Failure> {
+    if let Some(given) = &session.given {
+        return Ok(Scene::clone(given));
+    }
     let _progress = session.watch(format!("reading {}", path.display()));
     let scene = Scene::open_within(path, &session.access, &session.job)?;
     for warning in &scene.warnings {

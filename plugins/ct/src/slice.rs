@@ -86,7 +86,7 @@ impl Slices {
 
     /// Who says so.
     #[must_use]
-    pub(crate) fn pixel_from(&self) -> PixelFrom {
+    pub fn pixel_from(&self) -> PixelFrom {
         self.pixel_from
     }
 

@@ -1,0 +1,39 @@
+"""Predicts damage in reinforced-concrete members.
+
+>>> import intrados
+>>> scene = intrados.load("room")
+>>> scene.meters
+('floor', 'under the ceiling')
+"""
+
+from ._detect import Crack, Pore, Slice, detect
+from ._errors import Error, InputError, MissingError, UsageError, WriteError
+from ._intrados import __version__
+from ._reports import Analysis, Estimate, Evidence, Measurement, MemberLife, MemberPrediction, Prediction, Reading, Report, Zone
+from ._scene import Member, Scene, load
+
+__all__ = [
+    "Analysis",
+    "Crack",
+    "Error",
+    "Estimate",
+    "Evidence",
+    "InputError",
+    "Measurement",
+    "Member",
+    "MemberLife",
+    "MemberPrediction",
+    "MissingError",
+    "Pore",
+    "Prediction",
+    "Reading",
+    "Report",
+    "Scene",
+    "Slice",
+    "UsageError",
+    "WriteError",
+    "Zone",
+    "__version__",
+    "detect",
+    "load",
+]
