@@ -25,6 +25,8 @@ pub struct History {
     /// One a brick.
     pub points: Vec<Memory>,
     /// Displacements in which an element was born, for those that were born after the beginning:
+    /// Displacements of a brick, as its strain counts them, when it was first damaged (m).
+    pub(crate) softened: BTreeMap<u32, [f64; 24]>,
     /// they are its natural shape. By number in the order of elements: bricks first.
     pub born: BTreeMap<u32, [f64; 24]>,
     /// By bar or tendon, and piece.

@@ -190,6 +190,7 @@ impl<'m> System<'m> {
                 .map(|hex| self.law(hex).born(time, self.birth(hex).min(time)))
                 .collect(),
             born: Default::default(),
+            softened: Default::default(),
             steel: self.model.steel.iter().map(super::Steel::rest).collect(),
             slips: vec![Default::default(); self.model.mesh.interfaces.len()],
             bars: self.resting_bars(),
@@ -499,7 +500,13 @@ impl<'m> System<'m> {
                 Ok((modes, memory))
             })
             .collect::<Result<_, Failure>>()?;
-        let (modes, points) = after.into_iter().unzip();
+        let (modes, points): (_, Vec<Memory>) = after.into_iter().unzip();
+        let mut softened = trial.history.softened.clone();
+        for (e, points) in points.iter().enumerate() {
+            if points.is_damaged() && !softened.contains_key(&(e as u32)) {
+                softened.insert(e as u32, self.moved(e, trial.history, &x)?.local);
+            }
+        }
         let means = self.mean_strains(trial.history, &x);
         let mut steel = trial.history.steel.clone();
         for (bar, works) in steel.iter_mut().enumerate() {
@@ -539,6 +546,7 @@ impl<'m> System<'m> {
             modes,
             points,
             born,
+            softened,
             steel,
             slips,
             bars,
@@ -690,7 +698,8 @@ impl<'m> System<'m> {
         let corners = self.model.mesh.corners(hex as u32);
         let solid =
             if self.model.kind == Kind::Incompatible && trial.history.points[hex].is_damaged() {
-                stiffened(&corners, u, modes, law)
+                let since = trial.history.softened.get(&(hex as u32)).unwrap_or(&[0.0; 24]);
+                stiffened(&corners, u, modes, since, law)
             } else {
                 hex8::integrate(self.model.kind, &corners, u, modes, law)
             };
@@ -787,16 +796,20 @@ fn since_birth(history: &History, element: u32, mut u: [f64; 24]) -> [f64; 24] {
 /// A damaged brick: its modes stay as they were when it was sound. Free, they would let the strain
 /// localise between the points of one element, where a crack dissipates half of what the crack band
 /// foresees (Winkler's panel with 65 N/m then breaks at 5.3 kN instead of 6.2). Nor may shear that
-/// is not there hold it where it bends.
+/// is not there hold it where it bends. Its strain goes on from what it was when it was damaged, at
+/// the displacements `since`.
 fn stiffened(
     corners: &[DVec3; 8],
     u: &[f64; 24],
     modes: &Modes,
+    since: &[f64; 24],
     mut law: impl FnMut(usize, &Voigt) -> (Voigt, Tangent),
 ) -> Result<hex8::Solid, ElementError> {
     let mut held = [[0.0; 6]; 8];
     for (held, natural) in held.iter_mut().zip(hex8::GAUSS) {
-        *held = hex8::rows(Kind::Incompatible, corners, natural)?.strain(&[0.0; 24], modes);
+        let before = hex8::rows(Kind::Incompatible, corners, natural)?.strain(since, modes);
+        let now = hex8::rows(Kind::Assumed, corners, natural)?.strain(since, &Modes::default());
+        *held = tensor::sub(&before, &now);
     }
     let law = |point: usize, strain: &Voigt| law(point, &tensor::add(strain, &held[point]));
     hex8::integrate(Kind::Assumed, corners, u, &mut Modes::default(), law)
