@@ -122,7 +122,7 @@ const WORK: [f64; 2] = [1.0, 5e7];
 const STEPS: usize = 400;
 /// It is followed no further than so many times the displacement at the first yielding.
 const DUCTILE: f64 = 12.0;
-/// Nor than so many times the displacement at the peak.
+/// Nor than so many times the displacement at the peak, once concrete is crushed or there is no steel.
 const BEYOND: f64 = 2.0;
 /// How far parts may move, over the longest measure.
 const FAR: f64 = 0.1;
@@ -379,8 +379,12 @@ impl<'a, 'm> Watch<'a, 'm> {
             return Some(format!("the load has fallen below {SPENT} of its peak"));
         }
         let at_peak = peak.displacement_m.abs();
+        // What falls when it cracks may rise again, as long as bars wait to yield and concrete is
+        // whole.
+        let is_over = self.structure.model.steel.is_empty() || self.crushed() > 0.0;
         if moved > BEYOND * at_peak
             && self.yielding.is_none()
+            && is_over
             && now.load_factor < 0.97 * peak.load_factor
         {
             return Some(format!("it has moved {BEYOND} times as far as at its peak"));
