@@ -381,11 +381,10 @@ impl<'a, 'm> Watch<'a, 'm> {
         let at_peak = peak.displacement_m.abs();
         // What falls when it cracks may rise again, as long as bars wait to yield and concrete is
         // whole.
-        let is_over = self.structure.model.steel.is_empty() || self.crushed() > 0.0;
         if moved > BEYOND * at_peak
             && self.yielding.is_none()
-            && is_over
             && now.load_factor < 0.97 * peak.load_factor
+            && (self.structure.model.steel.is_empty() || self.crushed() > 0.0)
         {
             return Some(format!("it has moved {BEYOND} times as far as at its peak"));
         }

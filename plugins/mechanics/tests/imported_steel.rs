@@ -3,19 +3,22 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
+mod modelled;
+
 use std::{f64::consts::FRAC_PI_4, path::Path, sync::Arc};
 
-use glam::{DVec3, Mat4, Vec3};
+use glam::{DVec3, Vec3};
 use intrados_mechanics::{
     member::{Axes, Meshing, Prepared, prepare},
     model::System,
 };
 use intrados_scene::{
-    Frame, Member, MemberKind, Mesh, Object, Part, Scene, SteelLine, Structure,
+    MemberKind, Mesh, Part, Scene, SteelLine,
     import::{Told, import},
-    structure::{Grade, Hold, Place, Support},
+    structure::Grade,
 };
 use intrados_stage::{Access, Job};
+use modelled::alone;
 
 /// E_s, Pa (EN 1992-1-1, 3.2.7).
 const STEEL: f64 = 200e9;
@@ -31,38 +34,7 @@ fn beam(bars: &[(f32, f32, f32)]) -> Scene {
         [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
     let triangles = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
     let mesh = Mesh { positions: (0..8).map(corner).collect(), triangles, ..Mesh::default() };
-    let bounds = [-0.5 * size, 0.5 * size];
-    let member = Member {
-        id: "B".into(),
-        name: "beam".into(),
-        kind: MemberKind::Beam,
-        concrete: "C30/37".into(),
-        concrete_assumed: false,
-        exposure: None,
-        frame: Frame::of_box(MemberKind::Beam, bounds),
-        bounds,
-        volume: 0.32,
-        slices: Vec::new(),
-        truth: Vec::new(),
-    };
-    let object = Object {
-        name: "B".into(),
-        mesh: 0,
-        transform: Mat4::IDENTITY,
-        material: 0,
-        member: Some(0),
-        part: Part::Concrete,
-    };
-    let support =
-        Support { member: "B".into(), place: Place::Bottom, hold: Hold::Fixed, alone: false };
-    let mut scene = Scene {
-        meshes: vec![Arc::new(mesh)],
-        objects: vec![object],
-        members: vec![member],
-        structure: Arc::new(Structure { supports: vec![support], ..Structure::default() }),
-        ..Scene::default()
-    };
-    scene.assemble();
+    let mut scene = alone("B", MemberKind::Beam, mesh, 0.32);
     let line = |(i, &(diameter, y, beyond)): (usize, &(f32, f32, f32))| SteelLine {
         name: format!("bar {i}"),
         part: Part::Bar,

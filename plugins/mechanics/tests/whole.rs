@@ -2,19 +2,17 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may end by a panic")]
 
-use std::sync::Arc;
+mod modelled;
 
-use glam::{DVec3, Mat4, Vec3};
+use glam::{DVec3, Vec3};
 use intrados_mechanics::{
     frame::{MemberForces, SectionForces, Whole, whole},
     member::{Meshing, prepare_within},
     model::Action,
 };
-use intrados_scene::{
-    Frame, Member, MemberKind, Mesh, Object, Part, Scene, Structure,
-    structure::{Hold, Place, Support},
-};
+use intrados_scene::{MemberKind, Mesh, Scene};
 use intrados_stage::Job;
+use modelled::alone;
 
 /// A scene of this text.
 fn scene(text: &str) -> Scene {
@@ -245,39 +243,7 @@ fn pier() -> Scene {
         triangles: back.into_iter().chain(front).chain(sides).collect(),
         ..Mesh::default()
     };
-    let bounds = [Vec3::new(-1.2, 0.0, -0.3), Vec3::new(1.2, 3.8, 0.3)];
-    let member = Member {
-        id: "P".into(),
-        name: "P".into(),
-        kind: MemberKind::Column,
-        concrete: "C30/37".into(),
-        concrete_assumed: false,
-        exposure: None,
-        frame: Frame::of_box(MemberKind::Column, bounds),
-        bounds,
-        volume: PIER,
-        slices: Vec::new(),
-        truth: Vec::new(),
-    };
-    let object = Object {
-        name: "P".into(),
-        mesh: 0,
-        transform: Mat4::IDENTITY,
-        material: 0,
-        member: Some(0),
-        part: Part::Concrete,
-    };
-    let support =
-        Support { member: "P".into(), place: Place::Bottom, hold: Hold::Fixed, alone: false };
-    let mut scene = Scene {
-        meshes: vec![Arc::new(mesh)],
-        objects: vec![object],
-        members: vec![member],
-        structure: Arc::new(Structure { supports: vec![support], ..Structure::default() }),
-        ..Scene::default()
-    };
-    scene.assemble();
-    scene
+    alone("P", MemberKind::Column, mesh, PIER)
 }
 
 /// Volume of that pier, m³.

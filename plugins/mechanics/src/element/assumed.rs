@@ -24,7 +24,7 @@ const PAIRS: [(usize, usize, usize); 3] = [(0, 1, 2), (1, 2, 0), (2, 0, 1)];
 /// # Errors
 /// [`ElementError::Inverted`].
 pub(crate) fn rows(nodes: &[DVec3; 8], natural: DVec3) -> Result<[[f64; 24]; 6], ElementError> {
-    rows_in(nodes, natural, &axes(nodes))
+    rows_in(nodes, natural, 0, &axes(nodes)).map(|(rows, _)| rows)
 }
 
 /// Stiffness and internal force. The law is that of [`super::hex8::integrate`].
@@ -39,10 +39,10 @@ pub(crate) fn integrate(
     let axes = axes(nodes);
     let mut sum = Element::zero();
     for (point, natural) in GAUSS.into_iter().enumerate() {
-        let rows = rows_in(nodes, natural, &axes)?;
+        let (rows, det) = rows_in(nodes, natural, point, &axes)?;
         let strain = rows.map(|row| row.iter().zip(u).map(|(r, u)| r * u).sum());
         let (stress, tangent) = law(point, &strain);
-        sum.add(&rows, &stress, &tangent, jacobian(nodes, natural).determinant());
+        sum.add(&rows, &stress, &tangent, det);
     }
     sum.finite()
 }
@@ -56,16 +56,19 @@ fn axes(nodes: &[DVec3; 8]) -> DMat3 {
     DMat3::from_cols(first, third.cross(first), third)
 }
 
+/// The rows, and the determinant of ∂x/∂ξ.
 fn rows_in(
     nodes: &[DVec3; 8],
     natural: DVec3,
+    point: usize,
     axes: &DMat3,
-) -> Result<[[f64; 24]; 6], ElementError> {
+) -> Result<([[f64; 24]; 6], f64), ElementError> {
     // Gradients along the brick's axes.
     let along = |natural: DVec3| {
-        gradients(nodes, natural).map(|all| all.map(|g| (axes.transpose() * g).to_array()))
+        let (all, det) = gradients(nodes, natural, point)?;
+        Ok((all.map(|g| (axes.transpose() * g).to_array()), det))
     };
-    let here = along(natural)?;
+    let (here, det) = along(natural)?;
     let mut local = [[0.0; 24]; 6];
     let mut put = |row: usize, node: usize, along: DVec3, by: f64| {
         (0..3).for_each(|c| local[row][3 * node + c] += by * along[c]);
@@ -76,12 +79,12 @@ fn rows_in(
     for (row, (i, j, across)) in (3..).zip(PAIRS) {
         let mut middle = DVec3::ZERO;
         middle[across] = natural[across];
-        for (node, slopes) in along(middle)?.iter().enumerate() {
+        for (node, slopes) in along(middle)?.0.iter().enumerate() {
             put(row, node, axes.col(i), slopes[j]);
             put(row, node, axes.col(j), slopes[i]);
         }
     }
-    Ok(in_the_world(&local, axes))
+    Ok((in_the_world(&local, axes), det))
 }
 
 /// Strains along the brick's axes as strains along the world's.

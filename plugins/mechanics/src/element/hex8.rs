@@ -144,16 +144,20 @@ fn jacobian_of(nodes: &[DVec3; 8], slopes: &[DVec3; 8]) -> DMat3 {
     sum
 }
 
-/// Gradients of the nodes' shapes (1/m).
+/// Gradients of the nodes' shapes (1/m), and the determinant of ∂x/∂ξ (m³).
 ///
 /// # Errors
-/// [`ElementError::Inverted`].
-pub(super) fn gradients(nodes: &[DVec3; 8], natural: DVec3) -> Result<[DVec3; 8], ElementError> {
+/// [`ElementError::Inverted`], naming the integration point `point`.
+pub(super) fn gradients(
+    nodes: &[DVec3; 8],
+    natural: DVec3,
+    point: usize,
+) -> Result<([DVec3; 8], f64), ElementError> {
     let slopes = slopes(natural);
     let matrix = jacobian_of(nodes, &slopes);
-    right_way_round(matrix.determinant(), 0)?;
+    let det = right_way_round(matrix.determinant(), point)?;
     let inverse = matrix.inverse().transpose();
-    Ok(slopes.map(|slope| inverse * slope))
+    Ok((slopes.map(|slope| inverse * slope), det))
 }
 
 /// Natural coordinates of a point (Newton from the centre); also answers somewhat outside the
@@ -393,15 +397,10 @@ impl<'a> Map<'a> {
         natural: DVec3,
         point: usize,
     ) -> Result<Place<N>, ElementError> {
-        let slopes = slopes(natural);
-        let matrix = jacobian_of(self.nodes, &slopes);
-        let det = right_way_round(matrix.determinant(), point)?;
-        let inverse = matrix.inverse().transpose();
+        let (of_nodes, det) = gradients(self.nodes, natural, point)?;
         let mut gradients = [[0.0; N]; 3];
         let mut put = |a: usize, g: DVec3| (0..3).for_each(|axis| gradients[axis][a] = g[axis]);
-        for (a, slope) in slopes.into_iter().enumerate() {
-            put(a, inverse * slope);
-        }
+        of_nodes.into_iter().enumerate().for_each(|(a, gradient)| put(a, gradient));
         if N > 8 {
             let top = -2.0 * (natural - self.shift) * (self.centre_det / det);
             put(8, self.centre.x_axis * top.x);

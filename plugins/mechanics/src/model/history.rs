@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::{law::Memory, steel::Piecework};
-use crate::{element::hex8::Modes, material::steel::BarState};
+use crate::{element::hex8::Modes, material::steel::BarState, tensor::Voigt};
 
 /// A state in equilibrium, from which the next step starts. Steps are tried on it, and it is
 /// replaced once they have converged.
@@ -25,8 +25,9 @@ pub struct History {
     /// One a brick.
     pub points: Vec<Memory>,
     /// Displacements in which an element was born, for those that were born after the beginning:
-    /// Displacements of a brick, as its strain counts them, when it was first damaged (m).
-    pub(crate) softened: BTreeMap<u32, [f64; 24]>,
+    /// Of bricks that are damaged the strain of their points that goes on beside what they are
+    /// displaced by: that of their modes when they were first damaged.
+    pub(crate) softened: BTreeMap<u32, [Voigt; 8]>,
     /// they are its natural shape. By number in the order of elements: bricks first.
     pub born: BTreeMap<u32, [f64; 24]>,
     /// By bar or tendon, and piece.

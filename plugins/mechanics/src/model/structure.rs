@@ -500,11 +500,12 @@ impl<'m> System<'m> {
                 Ok((modes, memory))
             })
             .collect::<Result<_, Failure>>()?;
-        let (modes, points): (_, Vec<Memory>) = after.into_iter().unzip();
+        let (modes, points): (Vec<Modes>, Vec<Memory>) = after.into_iter().unzip();
         let mut softened = trial.history.softened.clone();
         for (e, points) in points.iter().enumerate() {
-            if points.is_damaged() && !softened.contains_key(&(e as u32)) {
-                softened.insert(e as u32, self.moved(e, trial.history, &x)?.local);
+            let counts = self.model.kind == Kind::Incompatible && points.is_damaged();
+            if counts && !softened.contains_key(&(e as u32)) {
+                softened.insert(e as u32, self.held(e, trial.history, &x, &modes[e])?);
             }
         }
         let means = self.mean_strains(trial.history, &x);
@@ -698,8 +699,7 @@ impl<'m> System<'m> {
         let corners = self.model.mesh.corners(hex as u32);
         let solid =
             if self.model.kind == Kind::Incompatible && trial.history.points[hex].is_damaged() {
-                let since = trial.history.softened.get(&(hex as u32)).unwrap_or(&[0.0; 24]);
-                stiffened(&corners, u, modes, since, law)
+                stiffened(&corners, u, trial.history.softened.get(&(hex as u32)), law)
             } else {
                 hex8::integrate(self.model.kind, &corners, u, modes, law)
             };
@@ -751,6 +751,29 @@ impl<'m> System<'m> {
         turn.bring_back(&own.chain(more).collect::<Vec<_>>(), k, f);
     }
 
+    /// What the strain at a brick's points is beyond that of [`Kind::Assumed`], by its modes and by
+    /// the shear of bending: what it goes on with when it is damaged.
+    fn held(
+        &self,
+        hex: usize,
+        history: &History,
+        x: &[f64],
+        modes: &Modes,
+    ) -> Result<[Voigt; 8], Failure> {
+        let corners = self.model.mesh.corners(hex as u32);
+        let u = self.moved(hex, history, x)?.local;
+        let strain = |kind: Kind, natural: DVec3| {
+            hex8::rows(kind, &corners, natural).map(|rows| rows.strain(&u, modes))
+        };
+        let mut held = [[0.0; 6]; 8];
+        for (held, natural) in held.iter_mut().zip(hex8::GAUSS) {
+            let both = [Kind::Incompatible, Kind::Assumed].map(|kind| strain(kind, natural));
+            let [before, after] = both.map(|s| s.map_err(|why| self.of_hex(hex, why)));
+            *held = tensor::sub(&before?, &after?);
+        }
+        Ok(held)
+    }
+
     pub(super) fn of_hex(&self, hex: usize, source: ElementError) -> Failure {
         Failure::Element { element: self.model.mesh.name(ElementId::Hex(hex as u32)), source }
     }
@@ -796,21 +819,16 @@ fn since_birth(history: &History, element: u32, mut u: [f64; 24]) -> [f64; 24] {
 /// A damaged brick: its modes stay as they were when it was sound. Free, they would let the strain
 /// localise between the points of one element, where a crack dissipates half of what the crack band
 /// foresees (Winkler's panel with 65 N/m then breaks at 5.3 kN instead of 6.2). Nor may shear that
-/// is not there hold it where it bends. Its strain goes on from what it was when it was damaged, at
-/// the displacements `since`.
+/// is not there hold it where it bends. What its modes were to its points then it keeps, `held`.
 fn stiffened(
     corners: &[DVec3; 8],
     u: &[f64; 24],
-    modes: &Modes,
-    since: &[f64; 24],
+    held: Option<&[Voigt; 8]>,
     mut law: impl FnMut(usize, &Voigt) -> (Voigt, Tangent),
 ) -> Result<hex8::Solid, ElementError> {
-    let mut held = [[0.0; 6]; 8];
-    for (held, natural) in held.iter_mut().zip(hex8::GAUSS) {
-        let before = hex8::rows(Kind::Incompatible, corners, natural)?.strain(since, modes);
-        let now = hex8::rows(Kind::Assumed, corners, natural)?.strain(since, &Modes::default());
-        *held = tensor::sub(&before, &now);
-    }
-    let law = |point: usize, strain: &Voigt| law(point, &tensor::add(strain, &held[point]));
+    let law = |point: usize, strain: &Voigt| match held {
+        Some(held) => law(point, &tensor::add(strain, &held[point])),
+        None => law(point, strain),
+    };
     hex8::integrate(Kind::Assumed, corners, u, &mut Modes::default(), law)
 }

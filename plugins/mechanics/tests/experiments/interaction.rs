@@ -2,16 +2,6 @@
 //! by fibres. Half of a member on two supports is computed: pressed along its axis first, then
 //! pushed at a third of its span, so that nothing but its own moment acts on its middle.
 
-use intrados_mechanics::{
-    Meshing,
-    analysis::Observer,
-    analyze,
-    member::Along,
-    model::{History, Point, Step},
-    prepare,
-};
-use intrados_scene::Scene;
-
 use super::*;
 
 /// Side of the section; half of the span, and from the support to the jack, m.
@@ -133,18 +123,9 @@ fn bending_with_axial_force() {
         if only.is_some_and(|n| n != axial) {
             continue;
         }
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("column.ron");
-        std::fs::write(&path, scene(axial)).unwrap();
-        let scene = Scene::load(&path, &Job::default()).unwrap();
-        let assembly = &scene.structure.assemblies[0];
         let element = sizes(&[0.0])[0];
-        let meshing = Meshing { element: (element > 0.0).then_some(element) };
-        let mut prepared = prepare(&scene, assembly, meshing, &Job::default()).unwrap();
-        assert!(prepared.raise(&["jack"], Along::Automatic));
         let mut sag = Sag::default();
-        let life =
-            analyze(&prepared, MarchSettings::of_life(), &Job::default(), &mut sag).unwrap().0;
+        let life = jacked(&scene(axial), (element > 0.0).then_some(element), &mut sag);
         let found = life.strength.unwrap();
         let moment = found.peak.load_n * ARM + 1e3 * axial * sag.sag;
         let section = by_fibres(1e3 * axial);

@@ -48,6 +48,9 @@ use std::{
 
 use glam::DVec3;
 use intrados_mechanics::{
+    Meshing,
+    analysis::{Observer, Outcome},
+    analyze,
     element::embed::embed,
     material::{
         bond::Bond,
@@ -56,11 +59,14 @@ use intrados_mechanics::{
         law::Cracks,
         steel::Bar,
     },
+    member::Along,
     mesh::Locator,
-    model::{Slipping, Steel, SteelKind},
+    model::{History, Point, Slipping, Steel, SteelKind, Step},
     prelude::*,
+    prepare,
     write::{Curve, plot},
 };
+use intrados_scene::Scene;
 use intrados_stage::Job;
 
 /// Set: one damage for all directions.
@@ -194,6 +200,23 @@ fn mean(nodes: &[u32], component: u8, sign: f64) -> Vec<(u32, u8, f64)> {
 /// Raises one load along a weighted sum of displacements.
 fn raised(load: usize, row: Vec<(u32, u8, f64)>) -> Drive {
     Drive::Raised { loads: vec![(load, 1.0)], control: Control::Row(row) }
+}
+
+/// The life of the first member of a scene, whose load `jack` is then raised to failure.
+fn jacked(text: &str, element: Option<f64>, watch: &mut impl Observer) -> Outcome {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("test.ron");
+    std::fs::write(&path, text).unwrap();
+    let scene = Scene::load(&path, &Job::default()).unwrap();
+    let assembly = &scene.structure.assemblies[0];
+    let mut prepared = prepare(&scene, assembly, Meshing { element }, &Job::default()).unwrap();
+    assert!(prepared.raise(&["jack"], Along::Automatic));
+    for body in &mut prepared.model.bodies {
+        if let Matter::Concrete(mix) = &mut body.matter {
+            mix.1.transverse = std::env::var_os("EXPERIMENT_UNSOFTENED").is_none();
+        }
+    }
+    analyze(&prepared, MarchSettings::of_life(), &Job::default(), watch).unwrap().0
 }
 
 /// What became of a member that was pushed.

@@ -5,16 +5,7 @@
 //! middle. No. 9 bars of 28.7 mm 64 and 127 mm above the bottom, two No. 4 on top, stirrups No. 2;
 //! half of each is computed.
 
-use intrados_mechanics::{
-    Meshing,
-    analysis::Observer,
-    analyze,
-    member::Along,
-    model::{History, Point, Step},
-    prepare,
-    strength::Strength,
-};
-use intrados_scene::Scene;
+use intrados_mechanics::strength::Strength;
 
 use super::*;
 
@@ -145,23 +136,9 @@ impl Observer for Talk {
 }
 
 /// What a member of a scene bears.
-pub(super) fn strength(text: &str, element: Option<f64>) -> Strength {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("test.ron");
-    std::fs::write(&path, text).unwrap();
-    let scene = Scene::load(&path, &Job::default()).unwrap();
-    let assembly = &scene.structure.assemblies[0];
-    let mut prepared = prepare(&scene, assembly, Meshing { element }, &Job::default()).unwrap();
-    assert!(prepared.raise(&["jack"], Along::Automatic));
-    for body in &mut prepared.model.bodies {
-        if let Matter::Concrete(mix) = &mut body.matter {
-            mix.1.transverse = std::env::var_os("EXPERIMENT_UNSOFTENED").is_none();
-        }
-    }
+fn strength(text: &str, element: Option<f64>) -> Strength {
     let begin = std::time::Instant::now();
-    let (life, _) =
-        analyze(&prepared, MarchSettings::of_life(), &Job::default(), &mut Talk::default())
-            .unwrap();
+    let life = jacked(text, element, &mut Talk::default());
     life.notes.iter().chain(&life.warnings).for_each(|n| println!("    {n}"));
     let strength = life.strength.expect("it was raised");
     println!(
