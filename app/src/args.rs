@@ -1157,6 +1157,10 @@ pub(crate) struct Predict {
     /// Forecast nothing: no lives in finite elements
     #[arg(long, conflicts_with_all = ["ahead", "element"])]
     pub(crate) no_forecast: bool,
+    /// Also what each member bears, as it is and as if it were sound: loads are raised until it
+    /// fails, minutes a member
+    #[arg(long, conflicts_with = "no_forecast")]
+    pub(crate) strength: bool,
     /// Refuse all if one slice is bad, instead of leaving it out
     #[arg(long)]
     pub(crate) strict: bool,

@@ -42,6 +42,7 @@ pub(crate) fn run(session: &Session, args: &args::Predict) -> Result<Outcome, Fa
             element_m: args.element,
             ..forecast::ForecastSettings::default()
         }),
+        strength: args.strength,
         strict: args.strict,
         ..predicting()
     };
@@ -211,6 +212,9 @@ fn table(document: &Document) -> String {
         m.conflicts.iter().for_each(|c| text += &format!("conflict {}, {c}\n", m.name));
         if let Some(seen) = m.photographed() {
             text += &format!("faces {}: {seen}\n", m.name);
+        }
+        if let Some(capacity) = &m.capacity {
+            text += &format!("strength {}: {}\n", m.name, capacity.told());
         }
         if let Some(check) = m.crack_check.as_ref().filter(|c| c.exceeded) {
             text += &format!(

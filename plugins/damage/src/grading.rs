@@ -48,6 +48,10 @@ pub struct Profile {
     /// Relative standard error of a forecast's damage: of the model and of what it assumes.
     #[serde(default)]
     pub forecast_error: f64,
+    /// Whether a member's damage is the share of its strength that what is known of it costs, as it
+    /// is computed by finite elements, and not that of its worst zone by the rule.
+    #[serde(default)]
+    pub by_strength: bool,
     /// Crack widths that are admitted, by exposure.
     #[serde(default)]
     pub crack_limits: Vec<CrackLimit>,

@@ -614,13 +614,11 @@ impl<'a> Watch<'a> {
 impl PartWatch {
     /// Place along the axis (0 to 1), and about it (0 to 1).
     fn place(&self, point: DVec3) -> (f64, f64) {
-        let axis = self.frame.axis.as_dvec3();
         let from = point - self.frame.start.as_dvec3();
-        let along = from.dot(axis) / axis.length_squared().max(1e-12);
         let ninety: Vec3 = self.frame.ninety();
         let turn = from.dot(ninety.as_dvec3()).atan2(from.dot(self.frame.zero.as_dvec3()))
             / std::f64::consts::TAU;
-        (along, turn.rem_euclid(1.0))
+        (along(&self.frame, point), turn.rem_euclid(1.0))
     }
 }
 
@@ -643,6 +641,12 @@ impl Observer for Watch<'_> {
         let passed = self.prepared.times.iter().filter(|&&time| time <= step.time).count();
         Ok(self.job.step(passed, self.prepared.times.len())?)
     }
+}
+
+/// Place along an axis, 0 to 1.
+pub(crate) fn along(frame: &Frame, point: DVec3) -> f64 {
+    let axis = frame.axis.as_dvec3();
+    (point - frame.start.as_dvec3()).dot(axis) / axis.length_squared().max(1e-12)
 }
 
 /// Gauges of strain that are read over the years, each with a gauge of stress at its place.
@@ -684,7 +688,7 @@ pub(crate) const CONCRETE_ASSUMED: f64 = 0.4;
 pub(crate) const STEEL_ASSUMED: f64 = 0.6;
 
 /// The relative error that assumptions about an assembly add to a forecast.
-fn assumed_error(assembly: &Assembly) -> f64 {
+pub(crate) fn assumed_error(assembly: &Assembly) -> f64 {
     let concrete = if assembly.concrete_assumed { CONCRETE_ASSUMED } else { 0.0 };
     let steel = if assembly.steel_assumed { STEEL_ASSUMED } else { 0.0 };
     concrete.hypot(steel)

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     limits::longest,
-    member::{Along, Prepared, Raised},
+    member::{Along, Prepared, Raised, Reach},
     model::{
         Action, Control, Drive, Failure, History, March, MarchSettings, Point, SteelKind, Step,
         System, past_peak,
@@ -118,10 +118,17 @@ const SHORT: f64 = 0.04;
 /// Work after the peak over that up to it, and work that is always allowed, as
 /// [`MarchSettings::work`] counts it: what falls apart has many equilibria to choose from.
 const WORK: [f64; 2] = [1.0, 5e7];
+/// The same where only the peak is wanted: what takes so much more for one step is past it.
+const PEAK_WORK: [f64; 2] = [0.3, 3e6];
 /// Steps, at most.
 const STEPS: usize = 400;
-/// It is followed no further than so many times the displacement at the first yielding.
-const DUCTILE: f64 = 12.0;
+/// For so many steps it must not have risen.
+const FALLING: usize = 3;
+/// The same share where only the peak is wanted.
+const PASSED: f64 = 0.97;
+/// It is followed no further than so many times the displacement at the first yielding: until it
+/// fails, and where only the peak is wanted (what comes after that is the hardening of bars).
+const DUCTILE: [f64; 2] = [12.0, 4.0];
 /// Nor than so many times the displacement at the peak, once concrete is crushed or there is no steel.
 const BEYOND: f64 = 2.0;
 /// How far parts may move, over the longest measure.
@@ -130,6 +137,9 @@ const FAR: f64 = 0.1;
 const OBLIQUE: [f64; 2] = [20.0, 70.0];
 /// Damage of compression past its peak from which concrete counts as crushed.
 const CRUSHED: f64 = 0.3;
+/// Share of the volume that is pressed beyond what its curve rises to, from which that is what ends
+/// it.
+const PRESSED: f64 = 0.5;
 /// Loads over those of elastic buckling at the peak, from which that is what ends it.
 const BUCKLES: f64 = 0.5;
 
@@ -232,7 +242,9 @@ pub(crate) fn raise(
         if watch.peak + 1 == watch.curve.len() {
             at_peak = march.spent();
         }
-        march.limit(at_peak + (WORK[0] * at_peak).max(WORK[1]));
+        let is_peak_enough = raised.to == Reach::Peak && !watch.waits();
+        let [share, least] = if is_peak_enough { PEAK_WORK } else { WORK };
+        march.limit(at_peak + (share * at_peak).max(least));
         if let Some(why) = watch.is_spent(length) {
             ended = why;
             break;
@@ -261,6 +273,19 @@ fn resultant(structure: &System, action: &Action, time: f64) -> Result<f64, Fail
     structure.add_load(action, 1.0, time, &mut forces)?;
     let each = forces.as_chunks::<3>().0.iter().map(|f| glam::DVec3::from_array(*f));
     Ok(each.sum::<glam::DVec3>().length())
+}
+
+/// Share of the volume whose damage of compression past its peak `is` such.
+fn share_of_volume(structure: &System, points: &[[Point; 8]], is: impl Fn(f64) -> bool) -> f64 {
+    let (mut such, mut whole) = (0.0, 0.0);
+    for (hex, points) in points.iter().enumerate() {
+        let volume = structure.model.mesh.hex_volume(hex as u32) / 8.0;
+        for point in points {
+            whole += volume;
+            such += if is(past_peak([0.0, point.damage[1]])) { volume } else { 0.0 };
+        }
+    }
+    such / f64::max(whole, 1e-300)
 }
 
 fn nodes(structure: &System) -> f64 {
@@ -339,6 +364,25 @@ impl<'a, 'm> Watch<'a, 'm> {
         risen(point) < share * risen(&self.curve[self.peak])
     }
 
+    /// Whether what falls when it cracks may rise again: bars wait to yield, and concrete is whole.
+    fn waits(&self) -> bool {
+        let is_whole = || self.crushed() == 0.0 && self.pressed() < PRESSED;
+        self.yielding.is_none() && !self.structure.model.steel.is_empty() && is_whole()
+    }
+
+    /// Share of the volume that was pressed beyond what its curve rises to, at the peak.
+    fn pressed(&self) -> f64 {
+        share_of_volume(self.structure, &self.at_peak, |past| past > 0.0)
+    }
+
+    /// Whether its load has not risen for some steps: what falls when it cracks rises again where
+    /// bars take over.
+    fn is_falling(&self) -> bool {
+        let last = self.curve.len().saturating_sub(FALLING + 1);
+        self.curve.len() > FALLING
+            && self.curve[last..].windows(2).all(|w| w[1].load_factor <= w[0].load_factor)
+    }
+
     fn see(&mut self, history: &History, step: &Step, points: &[[Point; 8]]) {
         let point = self.point(history, step.residual);
         self.curve.push(point);
@@ -375,16 +419,18 @@ impl<'a, 'm> Watch<'a, 'm> {
         if let Some((mode, name)) = &self.broken {
             return Some(format!("{}: {name}", mode.words()));
         }
-        if self.has_fallen(&now, SPENT) && peak.load_factor > self.curve[0].load_factor {
-            return Some(format!("the load has fallen below {SPENT} of its peak"));
+        let waits = self.waits();
+        let (spent, ductile) = match self.raised.to {
+            Reach::Peak => (if waits { SPENT } else { PASSED }, DUCTILE[1]),
+            Reach::Failure => (SPENT, DUCTILE[0]),
+        };
+        if self.has_fallen(&now, spent) && self.is_falling() {
+            return Some(format!("the load has fallen below {spent} of its peak"));
         }
-        let at_peak = peak.displacement_m.abs();
-        // What falls when it cracks may rise again, as long as bars wait to yield and concrete is
-        // whole.
-        if moved > BEYOND * at_peak
+        if moved > BEYOND * peak.displacement_m.abs()
             && self.yielding.is_none()
+            && !waits
             && now.load_factor < 0.97 * peak.load_factor
-            && (self.structure.model.steel.is_empty() || self.crushed() > 0.0)
         {
             return Some(format!("it has moved {BEYOND} times as far as at its peak"));
         }
@@ -394,9 +440,9 @@ impl<'a, 'm> Watch<'a, 'm> {
             return Some(format!("it has moved by the {:.1} mm asked for", 1e3 * to));
         }
         if let Some((at, _)) = &self.yielding
-            && moved > DUCTILE * at.displacement_m.abs()
+            && moved > ductile * at.displacement_m.abs()
         {
-            return Some(format!("it has moved {DUCTILE} times as far as where bars yield first"));
+            return Some(format!("it has moved {ductile} times as far as where bars yield first"));
         }
         (moved > FAR * length).then(|| "it has moved by a tenth of its length".into())
     }
@@ -509,6 +555,14 @@ impl<'a, 'm> Watch<'a, 'm> {
                 ),
             ));
         }
+        // Pressed evenly, all of it crushes at once, and no equilibrium is found after that.
+        let spent = self.pressed();
+        if spent > PRESSED {
+            return Ok((
+                Mode::Crushing,
+                format!("{:.0} % of its concrete is pressed as hard as it can be", 100.0 * spent),
+            ));
+        }
         if has_failed && self.slipped() {
             return Ok((Mode::Anchorage, "bars slip from the concrete".into()));
         }
@@ -537,17 +591,7 @@ impl<'a, 'm> Watch<'a, 'm> {
 
     /// Share of the volume that is crushed at the end.
     fn crushed(&self) -> f64 {
-        let (mut crushed, mut whole) = (0.0, 0.0);
-        for (hex, points) in self.last.iter().enumerate() {
-            let volume = self.structure.model.mesh.hex_volume(hex as u32) / 8.0;
-            for point in points {
-                whole += volume;
-                if past_peak([0.0, point.damage[1]]) > CRUSHED {
-                    crushed += volume;
-                }
-            }
-        }
-        crushed / f64::max(whole, 1e-300)
+        share_of_volume(self.structure, &self.last, |past| past > CRUSHED)
     }
 
     /// Whether a free end of a bar has slipped beyond what bond bears most at.

@@ -50,6 +50,7 @@ fn a_bar_is_pulled_out() {
         area,
         kind: SteelKind::Bar(bar),
         rust: None,
+        gone: Vec::new(),
         bond: Some(slipping),
         displaces: false,
     });

@@ -30,6 +30,7 @@ pub(crate) fn limits(
     scene: &Scene,
     members: &[MemberPrediction],
     items: &[ledger::Item],
+    unraised: &[(&str, &str)],
 ) -> Vec<String> {
     let mut limits = vec![
         "Damage is the share of strength lost in the worst zone (a tenth of the length). Of a zone without a slice of its own the others speak as far as the grading scale's correlation lengths reach, with an error that grows.".to_owned(),
@@ -41,6 +42,12 @@ pub(crate) fn limits(
     if scene.structure.bears_as_one() {
         limits.push("Members hand loads on as an elastic frame of whole sections does: what cracks and hands its load to others, and what falls, is not in the forecast.".to_owned());
     }
+    if members.iter().any(|m| m.capacity.is_some()) {
+        limits.push(OF_STRENGTH.to_owned());
+    }
+    let not_raised =
+        |(name, why): &(&str, &str)| format!("The strength of {name} was not computed: {why}.");
+    limits.extend(unraised.iter().map(not_raised));
     let silent = members.iter().filter(|m| m.damage.is_none()).count();
     if silent > 0 {
         limits.insert(
@@ -102,6 +109,9 @@ pub(crate) fn limits(
     }
     limits
 }
+
+/// How strength is computed, and what that leaves out.
+const OF_STRENGTH: &str = "Strength is that of mean materials as they are today (concrete gains with age), without safety factors, with bars that do not slip; zones that have lost concrete bear so much less in every direction, all zones are taken to err together, and pits of rust count as even loss. Its error bar has 10 % for the model.";
 
 /// So many members.
 fn many(n: usize) -> String {

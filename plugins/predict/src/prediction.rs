@@ -11,6 +11,7 @@ use intrados_damage::{
     verdict::Basis,
     zone::{ZONES, Zones},
 };
+use intrados_forecast::Capacity;
 use intrados_gauges::GaugeReading;
 use intrados_scene::MemberKind;
 use intrados_survey::photographed::FaceSeen;
@@ -100,6 +101,10 @@ pub struct MemberPrediction {
     pub worst_zone: Option<usize>,
     /// By state, the share of the length that is to be expected in it; of what is known.
     pub states: BTreeMap<String, f64>,
+    /// What it bears and what its damage costs of that; none where nobody asked, or no load acts on
+    /// it that could be raised.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub capacity: Option<Capacity>,
     /// The widest crack against what its exposure admits.
     pub crack_check: Option<CrackCheck>,
     /// Whether pieces of evidence contradict each other.

@@ -12,6 +12,8 @@ pub struct PredictSettings {
     pub profile: Profile,
     /// How lives in finite elements are computed; none: nothing is foretold.
     pub forecast: Option<forecast::ForecastSettings>,
+    /// Whether what members bear is computed, and what their damage costs of that.
+    pub strength: bool,
     /// How readings are made where nobody read the gauges of a member whose damage is planted.
     pub simulation: gauges::Simulation,
     /// Whether a bad slice ends the work, instead of being left out.
@@ -24,6 +26,7 @@ impl Default for PredictSettings {
             detect: detect::DetectSettings::default(),
             profile: Profile::default(),
             forecast: Some(forecast::ForecastSettings::default()),
+            strength: false,
             simulation: gauges::Simulation::default(),
             strict: false,
         }

@@ -101,6 +101,11 @@ fn properties(m: &MemberPrediction, prediction: &Prediction, date: &str) -> Valu
     put("WithinMonths", json!(m.within_months));
     put("WorstZoneFromStartInTenths", json!(m.worst_zone));
     put("CrackWidthInMillimetres", json!(m.crack_check.as_ref().map(|c| c.width_mm)));
+    if let Some(capacity) = &m.capacity {
+        put("LoadFactorToFailure", json!(capacity.load_factor.value));
+        put("LoadFactorStandardError", json!(capacity.load_factor.std_error));
+        put("FailsBy", json!(capacity.mode.words()));
+    }
     let sources: Vec<&str> = m.evidence.keys().map(|source| word(source)).collect();
     put("Evidence", json!(if sources.is_empty() { "none".into() } else { sources.join(", ") }));
     put("EvidenceContradictsItself", json!(m.conflict));

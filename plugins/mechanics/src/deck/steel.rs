@@ -67,6 +67,7 @@ impl Case {
                 area,
                 kind: SteelKind::Stressed(steel, stress),
                 rust: None,
+                gone: Vec::new(),
                 bond: None,
                 // As in Abaqus, whose embedded elements lie over their host.
                 displaces: false,

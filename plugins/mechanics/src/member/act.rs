@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use glam::DVec3;
 use intrados_scene::structure::{self, Body as Shape, GroundModel, Hold, Place};
 
-use super::{Along, Draft, MemberError, Raised, body::LINING, raised_by, warmth::Air};
+use super::{Along, Draft, MemberError, Raised, Reach, body::LINING, raised_by, warmth::Air};
 use crate::{
     element::spring::Winkler,
     material::{DAY, YEAR},
@@ -175,7 +175,7 @@ impl Draft<'_> {
             structure::Loading::ArcLength => Along::ArcLength,
         };
         let loads = raised_by(&self.model, &names);
-        (!loads.is_empty()).then_some(Raised { loads, along })
+        (!loads.is_empty()).then_some(Raised { loads, along, to: Reach::default() })
     }
 
     fn action(&mut self, load: &structure::Load) -> Result<Option<Action>, MemberError> {

@@ -164,6 +164,7 @@ impl Draft<'_> {
             area,
             kind: SteelKind::Bar(bar),
             rust: None,
+            gone: Vec::new(),
             bond: None,
             displaces: true,
         }))

@@ -84,6 +84,18 @@ pub struct Raised {
     pub loads: Vec<usize>,
     /// Along what.
     pub along: Along,
+    /// How far.
+    pub to: Reach,
+}
+
+/// How far loads are raised.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Reach {
+    /// Until the member has failed, which tells how.
+    #[default]
+    Failure,
+    /// No farther than its peak needs to be known.
+    Peak,
 }
 
 /// What grows from step to step.
@@ -106,11 +118,40 @@ impl Prepared {
         let loads = raised_by(&self.model, names);
         let acts = !loads.is_empty();
         if acts {
-            self.raised = Some(Raised { loads, along });
+            self.raised = Some(Raised { loads, along, to: Reach::default() });
         }
         acts
     }
+
+    /// Takes away what is known to be lost, from the beginning of its life on: by brick the share
+    /// of concrete that bears nothing, and the share of the steel's section in it that is gone.
+    /// Rust that would be computed does not come on top.
+    pub fn weaken(&mut self, lost: impl Fn(u32) -> Weakening) {
+        let bricks = self.model.mesh.hexes.len() as u32;
+        self.model.softening =
+            (0..bricks).map(|hex| lost(hex).concrete.clamp(0.0, MOST_LOST)).collect();
+        for steel in &mut self.model.steel {
+            steel.rust = None;
+            steel.gone = steel
+                .pieces
+                .iter()
+                .map(|piece| lost(piece.host as u32).steel.clamp(0.0, MOST_LOST))
+                .collect();
+        }
+    }
 }
+
+/// What is lost of a place, shares from 0 to 1.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Weakening {
+    /// Of the concrete: it bears nothing.
+    pub concrete: f64,
+    /// Of the steel's section.
+    pub steel: f64,
+}
+
+/// What is lost of a place at most: what is left hangs together.
+const MOST_LOST: f64 = 0.99;
 
 /// Numbers of a model's loads that come from these of the scene.
 fn raised_by(model: &Model, names: &[&str]) -> Vec<usize> {

@@ -127,6 +127,7 @@ impl Draft<'_> {
                 area: 0.25 * PI * diameter.powi(2),
                 kind: SteelKind::Bar(bar),
                 rust,
+                gone: Vec::new(),
                 bond,
                 displaces: true,
             });
@@ -156,7 +157,16 @@ impl Draft<'_> {
             plates: [None, None],
         });
         // A tendon lies in its duct.
-        Ok(Steel { name, pieces, area: tendon.area, kind, rust: None, bond: None, displaces: true })
+        Ok(Steel {
+            name,
+            pieces,
+            area: tendon.area,
+            kind,
+            rust: None,
+            gone: Vec::new(),
+            bond: None,
+            displaces: true,
+        })
     }
 
     /// How a bar slips where the scene asks for it: good conditions, ribs .6 of a diameter apart,

@@ -135,9 +135,7 @@ impl System<'_> {
                 .enumerate()
                 .filter(|(_, (piece, _))| self.is_alive(piece.host, history.time))
             {
-                let left =
-                    steel.rust.as_ref().map_or(1.0, |rust| rust.left(rust.since[i], history.time));
-                let force = steel.area * left * work.stress;
+                let force = steel.area_at(i, history.time) * work.stress;
                 let [first, second] = piece.natural.map(hex8::shape);
                 let slope: [f64; 8] =
                     std::array::from_fn(|a| (second[a] - first[a]) / piece.length());

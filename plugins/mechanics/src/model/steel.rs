@@ -23,6 +23,8 @@ pub struct Steel {
     pub kind: SteelKind,
     /// What takes its section; none: nothing.
     pub rust: Option<Rust>,
+    /// Share of every piece's section that is gone from the beginning, 0 to 1; empty: nothing is.
+    pub gone: Vec<f64>,
     /// How it slips; none: perfect bond. For bars.
     pub bond: Option<Slipping>,
     /// Whether there is no concrete where it lies; else it is added to the concrete, as closed
@@ -203,7 +205,8 @@ impl Steel {
     #[must_use]
     pub(crate) fn area_at(&self, piece: usize, time: f64) -> f64 {
         let since = |rust: &Rust| rust.since.get(piece).copied().unwrap_or(f64::INFINITY);
-        self.rust.as_ref().map_or(self.area, |rust| self.area * rust.left(since(rust), time))
+        let rusted = self.rust.as_ref().map_or(1.0, |rust| rust.left(since(rust), time));
+        self.area * rusted * (1.0 - self.gone.get(piece).copied().unwrap_or(0.0))
     }
 
     /// Adds stiffness and force of a bonded piece to those of its host.
@@ -251,6 +254,7 @@ mod tests {
             area: 5e-5,
             kind,
             rust: Some(rust),
+            gone: Vec::new(),
             bond: None,
             displaces: true,
         };

@@ -120,6 +120,7 @@ pub(super) fn ring(job: &Job) -> Checks {
         area: 8.0 * 140e-6,
         kind,
         rust: None,
+        gone: Vec::new(),
         bond: None,
         displaces: false,
     }];
@@ -223,6 +224,7 @@ pub(super) fn bursting(job: &Job) -> Checks {
         area: force / 1100e6,
         kind,
         rust: None,
+        gone: Vec::new(),
         bond: None,
         displaces: false,
     }];

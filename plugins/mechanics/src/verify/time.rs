@@ -128,6 +128,7 @@ pub(super) fn column(job: &Job) -> Checks {
         area: steel_area,
         kind: SteelKind::Bar(Bar::new(500e6)?),
         rust: None,
+        gone: Vec::new(),
         bond: None,
         displaces: false,
     });

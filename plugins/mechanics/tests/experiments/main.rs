@@ -177,6 +177,7 @@ fn lay(model: &mut Model, name: &str, ends: [DVec3; 2], [count, area]: [f64; 2],
         area,
         kind,
         rust: None,
+        gone: Vec::new(),
         bond,
         displaces: true,
     });

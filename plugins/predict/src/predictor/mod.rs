@@ -21,7 +21,7 @@ use intrados_damage::{
     ledger,
 };
 use intrados_forecast as forecast;
-use intrados_forecast::{FORECAST, Forecast, ForecastError, ForecastSettings, forecast};
+use intrados_forecast::{Capacity, FORECAST, Forecast, ForecastError, ForecastSettings, forecast};
 use intrados_gauges as gauges;
 use intrados_gauges::{GAUGES, GaugeError, GaugeReading, monitoring};
 use intrados_mechanics::frame;
@@ -88,6 +88,8 @@ pub struct Predictor {
     unused: BTreeMap<(usize, usize), String>,
     /// By model, the lives that have been computed.
     lives: BTreeMap<String, Vec<Forecast>>,
+    /// By model, what has been computed of its strength; or why nothing has.
+    strengths: BTreeMap<String, Result<Option<Capacity>, String>>,
     /// What every member's rest does to it, once a life has asked for it; or why nobody knows.
     frame: Option<Result<Option<frame::Whole>, String>>,
 }
@@ -112,6 +114,8 @@ enum Item {
     Photograph(usize, usize),
     /// What instruments and eyes found on a member.
     Survey(usize),
+    /// What a model bears with all that is known by then.
+    Strength(String),
     /// What an outside source has of a member, by its names.
     Outside(Arc<dyn EvidenceSource>, usize, Vec<String>),
 }
@@ -125,6 +129,7 @@ impl Item {
             Self::Gauges(_) | Self::Survey(_) => 5.0,
             Self::Photograph(..) => 40.0,
             Self::Life(_) => 30.0,
+            Self::Strength(_) => 300.0,
         }
     }
 }
@@ -162,6 +167,9 @@ impl Predictor {
                 .filter(|(_, items)| !items.is_empty());
             queue.extend(items.map(|(i, items)| Item::Outside(Arc::clone(source), i, items)));
         }
+        if settings.strength || settings.profile.by_strength {
+            queue.extend(forecast::models(scene).into_iter().map(Item::Strength));
+        }
         let readings = vec![Vec::new(); scene.members.len()];
         let lengths = scene.members.iter().map(|m| f64::from(m.frame.axis.length())).collect();
         let name = |a: &Assembly| (a.id.clone(), scene.name_of(&a.id).to_owned());
@@ -184,6 +192,7 @@ impl Predictor {
             unheard: BTreeMap::new(),
             unused: BTreeMap::new(),
             lives: BTreeMap::new(),
+            strengths: BTreeMap::new(),
             frame: None,
         }
     }
@@ -228,6 +237,7 @@ impl Predictor {
             }
             Some(Item::Slice(_)) => format!("reading slice {} of {slices}", self.next + 1),
             Some(Item::Life(_)) => self.label_of(&self.lives()),
+            Some(Item::Strength(model)) => format!("the strength of {}", self.name(model)),
             Some(Item::Gauges(_)) => "what strain gauges say".into(),
             Some(Item::Survey(_)) => "what was surveyed".into(),
             Some(Item::Photograph(..)) => "what a photograph shows".into(),
@@ -238,8 +248,12 @@ impl Predictor {
 
     /// What people call the lives of some models.
     fn label_of(&self, models: &[String]) -> String {
-        let name = |id: &String| self.names.get(id).unwrap_or(id).clone();
-        format!("the life of {}", models.iter().map(name).collect::<Vec<_>>().join(" and "))
+        let names: Vec<&str> = models.iter().map(|id| self.name(id)).collect();
+        format!("the life of {}", names.join(" and "))
+    }
+
+    fn name<'a>(&'a self, id: &'a String) -> &'a str {
+        self.names.get(id).unwrap_or(id)
     }
 
     /// Whether all slices of a member have been read and it had any.
@@ -287,6 +301,7 @@ impl Predictor {
             Item::Survey(member) => self.survey(scene, member, &job),
             Item::Photograph(photo, member) => self.behold(scene, photo, member, &job),
             Item::Outside(source, member, _) => self.ask(scene, source.as_ref(), member, &job),
+            Item::Strength(model) => self.raise(scene, &model, &job),
         };
         if let Err(why) = &done {
             self.fates[self.next - taken..].fill(Some(why.to_string()));
@@ -335,15 +350,13 @@ impl Predictor {
     ) -> Result<(), PredictError> {
         let Some(settings) = self.settings.forecast else { return Ok(()) };
         let settings = ForecastSettings { work: settings.work.or(Some(self.share())), ..settings };
+        if models.iter().any(|model| !self.lives.contains_key(model)) {
+            self.join(scene, job)?;
+            job.relabel(self.label_of(models));
+        }
         let rule = &self.settings.profile.rule;
         // Of several at once the first tells how far they are.
         let part = |k: usize| if k == 0 { job.part(0.0, 1.0) } else { job.part(0.0, 0.0) };
-        if self.frame.is_none() && models.iter().any(|model| !self.lives.contains_key(model)) {
-            let found = frame::joined(scene, job);
-            job.step(0, 1)?;
-            self.frame = Some(found.map_err(|why| why.to_string()));
-            job.relabel(self.label_of(models));
-        }
         let (known, frame) = (&self.lives, &self.frame);
         let life = |(k, model): (usize, &String)| {
             if let Some(known) = known.get(model) {
@@ -381,6 +394,36 @@ impl Predictor {
                 self.told.extend(foretold.into_iter().chain(monitored).map(|e| (index, e)));
             }
         }
+        Ok(())
+    }
+
+    /// Computes what all members do to each other, once.
+    fn join(&mut self, scene: &Scene, job: &Job) -> Result<(), PredictError> {
+        if self.frame.is_none() {
+            let found = frame::joined(scene, job);
+            job.step(0, 1)?;
+            self.frame = Some(found.map_err(|why| why.to_string()));
+        }
+        Ok(())
+    }
+
+    /// What a model bears with what is known of its members by now.
+    fn raise(&mut self, scene: &Scene, model: &str, job: &Job) -> Result<(), PredictError> {
+        self.join(scene, job)?;
+        job.relabel(format!("the strength of {}", self.name(&model.to_owned())));
+        let members = scene.structure.assembly(model).into_iter().flat_map(|a| &a.members);
+        let losses = members.filter_map(|id| {
+            let index = scene.members.iter().position(|m| m.id == *id)?;
+            Some((id.clone(), self.losses(index)))
+        });
+        let losses = losses.collect();
+        let (handed, _) = part_of(&self.frame, model);
+        let found = match forecast::capacity(scene, model, handed, &losses, job) {
+            Ok(found) => Ok(found),
+            Err(ForecastError::Cancelled) => return Err(Cancelled.into()),
+            Err(ForecastError::Because(why)) => Err(why),
+        };
+        self.strengths.insert(model.to_owned(), found);
         Ok(())
     }
 
@@ -519,7 +562,7 @@ impl Predictor {
                 let evidence = self.kept(*member, SURVEY)?;
                 Some(Done { fate, evidence, unused, ..Done::default() })
             }
-            Item::Life(_) | Item::Outside(..) | Item::Photograph(..) => None,
+            Item::Life(_) | Item::Strength(_) | Item::Outside(..) | Item::Photograph(..) => None,
         }
     }
 
@@ -549,7 +592,9 @@ impl Predictor {
                 self.told.extend(said.map(|e| (*member, e)));
                 self.unheard.extend(unused);
             }
-            Item::Life(_) | Item::Outside(..) | Item::Photograph(..) => return None,
+            Item::Life(_) | Item::Strength(_) | Item::Outside(..) | Item::Photograph(..) => {
+                return None;
+            }
         }
         self.next += 1;
         self.fates.resize(self.next, fate);
@@ -640,7 +685,7 @@ impl Predictor {
             scene: scene.name.clone(),
             scene_hash: scene.hash.clone(),
             score: score(&members, &self.settings),
-            limits: limits(scene, &members, &items),
+            limits: limits(scene, &members, &items, &self.unraised()),
             silences: items.iter().filter_map(silence).collect(),
             items,
             members,

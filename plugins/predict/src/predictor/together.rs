@@ -3,14 +3,14 @@
 use std::collections::BTreeMap;
 
 use intrados_damage::{
-    evidence::Evidence,
+    evidence::{Cause, Evidence, all_causes},
     fusion::Whole,
     grading::Profile,
     ledger, truth,
     verdict::{Basis, Looked, Verdict},
     zone::{ZONES, together, zone_at},
 };
-use intrados_forecast::FORECAST;
+use intrados_forecast::{Capacity, FORECAST, Losses, beyond};
 use intrados_gauges as gauges;
 use intrados_gauges::{
     GAUGES,
@@ -136,6 +136,8 @@ impl Predictor {
                     let why = why(piece, *member, source);
                     put(*member, id, PHOTOGRAPHED, photographed::name(photo), why);
                 }
+                // No evidence: it rests on all of that.
+                Item::Strength(_) => {}
                 Item::Outside(source, member, items) => {
                     for (n, item) in items.iter().enumerate() {
                         let own = self.unused.get(&(piece, n)).cloned();
@@ -172,6 +174,43 @@ impl Predictor {
         items.into_iter().map(|i| i.1).collect()
     }
 
+    /// What is known to be lost of a member; where nobody looked, nothing, with the error that the
+    /// profile declares for that.
+    pub(super) fn losses(&self, index: usize) -> Losses {
+        let Gathered { evidence, whole, .. } = self.gather(index);
+        let unknown = &self.settings.profile.fusion.unknown;
+        let of = |cause: Cause, zone: usize| {
+            let known = whole.causes.get(&cause).and_then(|zones| zones.0[zone]);
+            let std_error = unknown.get(&cause).copied().unwrap_or(0.0);
+            known.unwrap_or(Estimate { value: 0.0, std_error })
+        };
+        let foretold = evidence.get(FORECAST).and_then(|e| e.zones.get(&Cause::Concrete));
+        let concrete = |zone: usize| {
+            let foretold = foretold.and_then(|zones| zones.0[zone]).map_or(0.0, |e| e.value);
+            let causes = [beyond(of(Cause::Concrete, zone), foretold), of(Cause::Stiffness, zone)];
+            all_causes(causes.into_iter()).unwrap_or_default()
+        };
+        Losses {
+            concrete: std::array::from_fn(concrete),
+            steel: std::array::from_fn(|zone| of(Cause::Steel, zone)),
+        }
+    }
+
+    /// What is known of a member's strength.
+    fn capacity(&self, scene: &Scene, id: &str) -> Option<&Capacity> {
+        let model = &scene.structure.assembly_of(id)?.id;
+        self.strengths.get(model)?.as_ref().ok()?.as_ref()
+    }
+
+    /// Models whose strength could not be computed, and why.
+    pub(super) fn unraised(&self) -> Vec<(&str, &str)> {
+        let failed = self
+            .strengths
+            .iter()
+            .filter_map(|(model, found)| Some((self.name(model), found.as_ref().err()?.as_str())));
+        failed.collect()
+    }
+
     pub(super) fn member(
         &self,
         scene: &Scene,
@@ -184,7 +223,9 @@ impl Predictor {
         let profile = &self.settings.profile;
         let said: Vec<&Evidence> =
             evidence.values().filter(|e| whole.counted.contains(e.source)).collect();
-        let damage = whole.damage();
+        let capacity = self.capacity(scene, &member.id).cloned();
+        let cost = capacity.as_ref().filter(|_| profile.by_strength).map(|c| c.cost);
+        let damage = cost.or_else(|| whole.damage());
         let zone_basis = Basis::by_zone(&said);
         let found = survey::of_member(scene, &member.id).map(|(_, o)| o);
         let nothing = Shown::default();
@@ -217,6 +258,7 @@ impl Predictor {
             within_months: verdict.within_months,
             to_inspect: verdict.to_inspect,
             states: shares(&whole, profile),
+            capacity,
             crack_check: widest.and_then(|widest| crack_check(scene, member, widest, profile)),
             conflict: !conflicts.is_empty(),
             zones: whole.zones,
