@@ -1173,6 +1173,9 @@ pub(crate) struct Predict {
     /// The IFC model that the scene was imported from: a copy gets the results as property sets
     #[arg(long, value_name = "MODEL")]
     pub(crate) ifc: Option<PathBuf>,
+    /// Print the report, too, as report.pdf (by WeasyPrint or Chromium)
+    #[arg(long)]
+    pub(crate) pdf: bool,
     /// Folder for the report and its tables
     #[arg(long, value_name = "DIR", default_value = "out")]
     pub(crate) out: PathBuf,

@@ -4,7 +4,7 @@ use intrados_ct::SliceError;
 use intrados_experiments::ExperimentError;
 use intrados_photo::{map::MapError, picks::PicksError, series::SeriesError};
 use intrados_predict::PredictError;
-use intrados_report::RecordError;
+use intrados_report::{RecordError, pdf::PdfError};
 use intrados_scene::{ErrorKind, LoadError, attach::AttachError, gltf::ImportError, import};
 use intrados_stage::{Cancelled, access::Denied, file::WriteError};
 use intrados_xray::{recon::ReconError, scan::ScanError, volume::VolumeError};
@@ -202,7 +202,18 @@ impl From<RecordError> for Failure {
         match error {
             RecordError::Write(error) => error.into(),
             RecordError::Model(error) => error.into(),
+            RecordError::Pdf(error) => error.into(),
             RecordError::Cancelled(cancelled) => cancelled.into(),
+        }
+    }
+}
+
+impl From<PdfError> for Failure {
+    fn from(error: PdfError) -> Self {
+        match error {
+            PdfError::NoPrinter => Self::NoInput(error.to_string()),
+            PdfError::Failed(text) => Self::CannotWrite(text),
+            PdfError::Cancelled(cancelled) => cancelled.into(),
         }
     }
 }

@@ -165,3 +165,55 @@ fn what_was_not_looked_at_is_to_be_inspected() {
     assert!(!findings.contains("poor:") || findings.find("C1") > findings.find("B1"));
     assert_eq!(findings.matches("To be inspected").count(), 1, "{findings}");
 }
+
+/// Predicts with `--pdf` where the programs are that `printers` names, each a script; what was said,
+/// and the folder of the report.
+#[cfg(unix)]
+fn printed(printers: &[(&str, &str)]) -> (std::process::Output, tempfile::TempDir) {
+    use std::os::unix::fs::PermissionsExt;
+    let place = tempfile::tempdir().unwrap();
+    let at = |name: &str| place.path().join(name);
+    fs::write(at("scene.ron"), SCENE).unwrap();
+    fs::write(at("evidence.ron"), EVIDENCE).unwrap();
+    fs::create_dir(at("programs")).unwrap();
+    for (name, script) in printers {
+        let program = at("programs").join(name);
+        fs::write(&program, format!("#!/bin/sh\n{script}\n")).unwrap();
+        fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).unwrap();
+    }
+    let words = ["--no-forecast", "--spp", "0", "--pdf", "--out"];
+    let mut command = common::program();
+    command.env("PATH", at("programs")).arg("predict").arg(at("scene.ron"));
+    (command.args(words).arg(at("out")).output().unwrap(), place)
+}
+
+/// WeasyPrint is called as its manual says, INPUT then OUTPUT; here a copy stands in for the paper.
+#[cfg(unix)]
+#[test]
+fn the_report_is_printed_by_command() {
+    let (output, place) = printed(&[("weasyprint", "exec /bin/cp \"$1\" \"$2\"")]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let read = |name: &str| fs::read_to_string(place.path().join("out").join(name)).unwrap();
+    assert_eq!(read("report.pdf"), read("report.html"));
+    assert!(read("predict.json").contains("report.pdf"));
+    assert!(String::from_utf8_lossy(&output.stdout).contains("report.pdf"));
+}
+
+/// Refused before the work where nothing prints, and after it where a printer fails: nothing is
+/// half written.
+#[cfg(unix)]
+#[test]
+fn a_report_that_nothing_prints_is_refused() {
+    for (printers, code, why) in [
+        (&[][..], 66, "install one, or print report.html from any browser"),
+        (&[("chromium", "exit 1")], 73, "has printed nothing"),
+    ] {
+        let (output, place) = printed(printers);
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(code), "{said}");
+        assert!(said.contains(why), "{said}");
+        for name in ["report.html", "report.pdf", "predict.json"] {
+            assert!(!place.path().join("out").join(name).exists(), "{name}");
+        }
+    }
+}

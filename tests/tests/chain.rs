@@ -307,6 +307,7 @@ fn the_report_is_whole_and_escapes_names() {
         &[picture],
         None,
         &intrados_report::Provenance::default(),
+        None,
     )
     .unwrap();
     assert_eq!(files.len(), 10);

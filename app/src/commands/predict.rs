@@ -12,7 +12,7 @@ use intrados_damage::{
 use intrados_forecast as forecast;
 use intrados_light::{LitScene, plugin::Lit};
 use intrados_predict::{PredictSettings, Predicting, Prediction, Progress};
-use intrados_report::{Document, Record, check_model};
+use intrados_report::{Document, Record, check_model, pdf};
 use intrados_scene::{Scene, plugin::install, structure::Project};
 use intrados_stage::{Jobs, Pace};
 
@@ -30,6 +30,10 @@ pub(crate) fn run(session: &Session, args: &args::Predict) -> Result<Outcome, Fa
     put_on(&mut Arc::make_mut(&mut scene.structure).project, &args.cover);
     if let Some(model) = &args.ifc {
         check_model(model, &scene)?;
+    }
+    // Not after an hour's work.
+    if args.pdf && pdf::printer().is_none() {
+        return Err(pdf::PdfError::NoPrinter.into());
     }
     let settings = PredictSettings {
         detect: detect::DetectSettings {
@@ -62,6 +66,7 @@ pub(crate) fn run(session: &Session, args: &args::Predict) -> Result<Outcome, Fa
             samples: args.spp,
             seed: args.seed,
             ifc: args.ifc.clone(),
+            pdf: args.pdf,
         };
         Ok(record.make(&args.out, &lit, prediction, &session.job)?)
     })?;

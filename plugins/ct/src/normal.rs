@@ -21,6 +21,8 @@ pub struct Normal {
     pub seen: Mask,
     /// The body with its bars and ducts filled in.
     pub solid: Mask,
+    /// Pixels of the section along its outline that are not read, since their edge is blurred.
+    pub rim: usize,
 }
 
 /// Depths of air below sound concrete that the network has learnt, and what it is brought to where
@@ -36,7 +38,7 @@ pub fn normalised(
     settings: &DetectSettings,
     job: &Job,
 ) -> Result<Option<Normal>, Cancelled> {
-    Cut { slice: Cow::Borrowed(slice), seen: None }.normalised(settings, job)
+    Cut { slice: Cow::Borrowed(slice), seen: None, rim: 0 }.normalised(settings, job)
 }
 
 /// Grey below which a pixel that is open to the outside is no part of the body, relative to sound
@@ -48,6 +50,9 @@ const RIM: f32 = 3.0;
 const MOUTH: f32 = 8.0;
 /// Grey of metal, relative to sound concrete.
 const METAL: f32 = 1.6;
+/// Diameter up to which air that concrete encloses is a pore, mm: what is wider was left open, as
+/// ducts for strands are (from 40 mm on).
+const LARGEST_VOID_MM: f32 = 30.0;
 /// Share of the air that is blank in a slice that was cut out already, its open pores apart.
 const BLANK: f64 = 0.5;
 
@@ -56,12 +61,14 @@ pub(crate) struct Cut<'a> {
     slice: Cow<'a, Slice>,
     /// The body, if it was cut out here.
     seen: Option<Mask>,
+    /// See [`Normal::rim`].
+    rim: usize,
 }
 
 /// The slice with blank air, if it is not so already: streaks beyond the outline, and in what a
 /// spall has left, are no concrete, and the blurred edge is neither crack nor pore.
 pub(crate) fn cut_out<'a>(slice: &'a Slice, job: &Job) -> Result<Cut<'a>, Cancelled> {
-    let as_it_is = Cut { slice: Cow::Borrowed(slice), seen: None };
+    let as_it_is = Cut { slice: Cow::Borrowed(slice), seen: None, rim: 0 };
     job.check()?;
     let (grey, air) = (&slice.grey, air_outside(&slice.grey));
     job.check()?;
@@ -72,7 +79,8 @@ pub(crate) fn cut_out<'a>(slice: &'a Slice, job: &Job) -> Result<Cut<'a>, Cancel
     let mut body = grey.map(|v| v - air > OUTSIDE * (bright - air));
     let dark = body.map(|inside| !inside);
     job.check()?;
-    body.fill_gaps(body.count() / 50);
+    let void = 0.25 * std::f32::consts::PI * (LARGEST_VOID_MM / slice.pixel_mm).powi(2);
+    body.fill_gaps((body.count() / 50).max(void as usize));
     job.check()?;
     let outside =
         || grey.data.iter().zip(&body.data).filter(|(_, b)| !**b).map(|(v, _)| (v - air).abs());
@@ -94,6 +102,7 @@ pub(crate) fn cut_out<'a>(slice: &'a Slice, job: &Job) -> Result<Cut<'a>, Cancel
     let data = grey.data.iter().zip(&seen.data).map(|(&v, &s)| if s { v } else { air }).collect();
     Ok(Cut {
         slice: Cow::Owned(Slice { grey: Grid { data, ..*grey }, ..slice.clone() }),
+        rim: body.count() - seen.count(),
         seen: Some(seen),
     })
 }
@@ -134,7 +143,7 @@ impl Cut<'_> {
         let inside =
             |(&v, &b): (&f32, &bool)| if b { v.clamp(-1.0, settings.ceiling) } else { 1.0 };
         let grey = Grid { data: raw.data.iter().zip(&body.data).map(inside).collect(), ..raw };
-        Ok((body.count() > 0).then_some(Normal { grey, raw, body, seen, solid }))
+        Ok((body.count() > 0).then_some(Normal { grey, raw, body, seen, solid, rim: self.rim }))
     }
 }
 

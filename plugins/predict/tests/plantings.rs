@@ -48,6 +48,15 @@ const SPECIMEN: &str = r#"(schema: "intrados.scene/1",
     )],
 )"#;
 
+/// The same with four bars of 8 mm in 100 × 100 mm: fourteen pixels each.
+fn with_bars() -> String {
+    let bars = "reinforcement: (cover_mm: 15, bars: [Around(count: 4, diameter_mm: 8)])";
+    SPECIMEN
+        .replace("(width_m: 0.07, depth_m: 0.07)", "(width_m: 0.1, depth_m: 0.1)")
+        .replace("height_m: 0.4", &format!("height_m: 0.4, {bars}"))
+        .replace("width: 190", "width: 250")
+}
+
 /// Numbers of one planting.
 struct Dice(Key, std::cell::Cell<u32>);
 
@@ -151,6 +160,15 @@ fn pores(dice: &Dice) -> Planted {
     Planted { air: dice.log(0.005, 0.12), ..Planted::default() }
 }
 
+/// Bars that rust by 5 to 40 % and keep their rust, rolled up to 4.5 % thinner or thicker than they
+/// are called.
+fn rust(dice: &Dice) -> Planted {
+    let steel = dice.span(0.05, 0.4);
+    let left = (1.0 - steel) * dice.span(0.955, 1.045);
+    let rust = Damage::Corrosion { from: 0.0, to: 1.0, section_loss: (1.0 - left) as f32 };
+    Planted { air: dice.log(0.005, 0.04), more: vec![rust], steel, ..Planted::default() }
+}
+
 /// Air, and in two of three cores a crack.
 fn pores_and_cracks(dice: &Dice) -> Planted {
     let crack = Damage::Crack {
@@ -203,8 +221,11 @@ fn intervals_of_ct_hold_what_was_planted() {
 }
 
 #[test]
-#[ignore = "half an hour: two hundred scans are simulated and read"]
+#[ignore = "ten minutes and more: four hundred scans are simulated and read"]
 fn intervals_of_scans_hold_what_was_planted() {
-    let shares = held("scans", &scene(SPECIMEN), pores, &[POROSITY, DAMAGE]);
-    assert!(shares[1] >= 0.90, "{shares:?}");
+    let pores = held("scans", &scene(SPECIMEN), pores, &[POROSITY, DAMAGE]);
+    let bars = held("scans with bars", &scene(&with_bars()), rust, &[BARS]);
+    // Where edges of bars lie, and what no slice shows, is known less well than here. Porosity is
+    // missed where there is little air (docs/results.md), and printed.
+    assert!(pores[1] >= 0.90 && bars[0] >= 0.90, "{pores:?} {bars:?}");
 }

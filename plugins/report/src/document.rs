@@ -8,13 +8,18 @@ use std::{
 use intrados_ct::{batch::pores_csv, picture::Picture};
 use intrados_predict::Prediction;
 use intrados_scene::Scene;
-use intrados_stage::file::{Set, WriteError, put_into};
+use intrados_stage::{
+    Job,
+    file::{Set, WriteError, put_into},
+};
 use serde::Serialize;
 
 use crate::{
     basis::Basis,
     bcf::{Version, bcf},
-    defects_csv, evidence_csv, html, members_csv, model, slices_csv,
+    defects_csv, evidence_csv, html, members_csv, model, pdf,
+    record::RecordError,
+    slices_csv,
     visibility::{photograph::PhotographedDefect, radiograph::RadiographedDefect},
     zones_csv,
 };
@@ -67,10 +72,11 @@ impl Document {
 /// Writes, all at once ([`Set`]), `report.html`, `evidence.csv`, `members.csv`, `zones.csv`,
 /// `defects.csv`, `slices.csv`, `pores.csv`, `damage.bcf`, `damage-3.0.bcf` and `predict.json` into
 /// a folder, which is made if it is not there; where members have surfaces, `damage.glb` and
-/// `damage.vtu` too, and a `model` by its name where there is one. Names them in the document.
+/// `damage.vtu` too, a `model` by its name where there is one, and `report.pdf` where a job is given
+/// in which it is printed. Names them in the document.
 ///
 /// # Errors
-/// A file cannot be written.
+/// A file cannot be written, or the report not be printed.
 pub fn write(
     folder: &Path,
     scene: &Scene,
@@ -78,7 +84,8 @@ pub fn write(
     pictures: &[Picture],
     model: Option<(&str, &[u8])>,
     provenance: &Provenance,
-) -> Result<Vec<PathBuf>, WriteError> {
+    print: Option<&Job>,
+) -> Result<Vec<PathBuf>, RecordError> {
     let mut files = begin(folder)?;
     let texts: [(&str, fn(&Prediction) -> String); 6] = [
         ("evidence.csv", evidence_csv),
@@ -88,16 +95,18 @@ pub fn write(
         ("slices.csv", slices_csv),
         ("pores.csv", pores),
     ];
-    let reserved = ["report.html"].into_iter().chain(texts.iter().map(|t| t.0));
+    let pages = [Some(REPORT), print.map(|_| PRINTED)].into_iter().flatten();
+    let reserved = pages.chain(texts.iter().map(|t| t.0));
     let reserved = reserved.chain([TOPICS, TOPICS_3, PREDICTION]).chain(model.map(|m| m.0));
     reserved.for_each(|name| _ = files.place(name));
     model::write(&mut files, scene, &document.prediction)?;
     document.files = files.files().iter().map(|p| p.display().to_string()).collect();
-    let page = html(document, pictures, provenance).map_err(|e| WriteError {
-        path: folder.join("report.html"),
-        source: io::Error::other(e),
-    })?;
-    put_into(&mut files, "report.html", page.as_bytes())?;
+    let page = html(document, pictures, provenance)
+        .map_err(|e| WriteError { path: folder.join(REPORT), source: io::Error::other(e) })?;
+    put_into(&mut files, REPORT, page.as_bytes())?;
+    if let Some(job) = print {
+        pdf::print(&files.place(REPORT), &files.place(PRINTED), job)?;
+    }
     for (name, text) in texts {
         put_into(&mut files, name, text(&document.prediction).as_bytes())?;
     }
@@ -112,8 +121,12 @@ pub fn write(
     }
     let list = json(&folder.join(PREDICTION), document)?;
     put_into(&mut files, PREDICTION, list.as_bytes())?;
-    publish(files, PREDICTION)
+    Ok(publish(files, PREDICTION)?)
 }
+
+/// The report, and the same on paper.
+const REPORT: &str = "report.html";
+const PRINTED: &str = "report.pdf";
 
 /// Defects for programs that have the IFC model open, and for those that read the newer form.
 const TOPICS: &str = "damage.bcf";

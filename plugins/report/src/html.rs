@@ -511,7 +511,8 @@ impl<'a> Page<'a> {
                 test: r.test.clone(),
                 measured: format!("{:.2} ± {:.2} {unit}", scale * r.read, scale * r.std_error),
                 expected: format!("{:.2} {unit}", scale * r.sound),
-                ratio: cell((r.sound != 0.0).then(|| r.read / r.sound), 2),
+                // Of what a sound member hardly moves the ratio is noise.
+                ratio: cell((r.sound.abs() > 2.0 * r.std_error).then(|| r.read / r.sound), 2),
                 z: cell(Some(r.z), 1),
             }
         };

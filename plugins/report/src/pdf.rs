@@ -23,7 +23,7 @@ const PATIENCE: Duration = Duration::from_secs(180);
 
 /// What to do where there is no such program.
 pub const BY_HAND: &str = "A PDF is printed by WeasyPrint or Chromium, and neither is installed: \
-                           open report.html in any browser, and print it into a file.";
+                           install one, or print report.html from any browser into a file.";
 
 /// Why there is no PDF.
 #[derive(Debug, thiserror::Error)]
@@ -74,7 +74,8 @@ pub fn print(html: &Path, pdf: &Path, job: &Job) -> Result<(), PdfError> {
             return Ok(());
         }
     }
-    Err(PdfError::Failed(format!("{}: has printed nothing. {BY_HAND}", printer.display())))
+    let remedy = "print report.html from any browser into a file";
+    Err(PdfError::Failed(format!("{}: has printed nothing: {remedy}", printer.display())))
 }
 
 /// Waits for a program, and ends it with the job.

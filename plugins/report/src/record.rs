@@ -14,7 +14,7 @@ use intrados_predict::{MemberPrediction, Prediction};
 use intrados_scene::{Camera, Scene, gltf::Model, import::ImportError};
 use intrados_stage::{Cancelled, Job, file::WriteError};
 
-use super::{Document, Provenance, ifc, write};
+use super::{Document, Provenance, ifc, pdf::PdfError, write};
 use crate::{
     surface::{coloured, facets},
     visibility::{
@@ -39,11 +39,13 @@ pub struct Record {
     pub seed: u64,
     /// The IFC model of which a copy gets the results; none: none does.
     pub ifc: Option<PathBuf>,
+    /// Whether the report is printed, too, as `report.pdf`.
+    pub pdf: bool,
 }
 
 impl Default for Record {
     fn default() -> Self {
-        Self { command: String::new(), samples: 16, seed: 1, ifc: None }
+        Self { command: String::new(), samples: 16, seed: 1, ifc: None, pdf: false }
     }
 }
 
@@ -56,9 +58,21 @@ pub enum RecordError {
     /// The IFC model cannot take the results.
     #[error(transparent)]
     Model(#[from] ImportError),
+    /// The report cannot be printed.
+    #[error(transparent)]
+    Pdf(PdfError),
     /// Somebody asked to stop.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
+}
+
+impl From<PdfError> for RecordError {
+    fn from(error: PdfError) -> Self {
+        match error {
+            PdfError::Cancelled(cancelled) => Self::Cancelled(cancelled),
+            error => Self::Pdf(error),
+        }
+    }
 }
 
 impl Record {
@@ -66,7 +80,8 @@ impl Record {
     /// `folder`.
     ///
     /// # Errors
-    /// A file cannot be written, or the job was cancelled; before the last step nothing has been.
+    /// A file cannot be written, the report cannot be printed, or the job was cancelled; before the
+    /// last step nothing has been.
     pub fn make(
         &self,
         folder: &Path,
@@ -113,7 +128,12 @@ impl Record {
             None => None,
         };
         let model = model.as_ref().map(|m| (m.name.as_str(), m.bytes.as_slice()));
-        write(folder, scene, &mut document, &pictures, model, &provenance)?;
+        let printing = job.part(1.0, 1.0);
+        if self.pdf {
+            job.relabel("printing the report");
+        }
+        let print = self.pdf.then_some(&printing);
+        write(folder, scene, &mut document, &pictures, model, &provenance, print)?;
         Ok(document)
     }
 
@@ -148,7 +168,7 @@ impl Record {
         let painted =
             if known { Some(painted(scene, prediction, &job.part(0.0, 0.0))?) } else { None };
         if let Some(painted) = &painted {
-            const LEGEND: &str = "violet: sound, green: half of the strength lost, yellow: all of it; greyed: forecast only, nothing measured there; grey: nothing known";
+            const LEGEND: &str = "pale yellow: sound, orange: half of the strength lost, dark red: all of it; greyed: forecast only, nothing measured there; grey: nothing known";
             shots.push((
                 painted,
                 overview.clone(),

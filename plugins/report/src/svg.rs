@@ -145,23 +145,27 @@ pub(super) fn profile(m: &MemberPrediction) -> String {
             at - 3.0
         );
     }
+    // With a place for the truth.
+    let pitch = ((w - left - 8.0) / (m.evidence.len() + 1) as f64).min(96.0);
     for (k, (source, evidence)) in m.evidence.iter().enumerate() {
         let shift = (k as f64 + 0.5) / m.evidence.len() as f64 - 0.5;
-        let mark = |at: f64, d: f64| match k % 3 {
+        let mark = |at: f64, d: f64| match k % 5 {
             0 => format!("<circle cx=\"{at:.1}\" cy=\"{d:.1}\" r=\"3.2\" class=\"m0\"/>"),
             1 => format!(
                 "<rect x=\"{:.1}\" y=\"{:.1}\" width=\"6\" height=\"6\" class=\"m1\"/>",
                 at - 3.0,
                 d - 3.0
             ),
-            _ => format!("<path d=\"M{at:.1} {:.1}l4 7h-8z\" class=\"m2\"/>", d - 4.0),
+            2 => format!("<path d=\"M{at:.1} {:.1}l4 7h-8z\" class=\"m2\"/>", d - 4.0),
+            3 => format!("<path d=\"M{at:.1} {:.1}l4 4-4 4-4-4z\" class=\"m3\"/>", d - 4.0),
+            _ => format!("<path d=\"M{at:.1} {:.1}l4-7h-8z\" class=\"m4\"/>", d + 4.0),
         };
         for (zone, reading) in
             evidence.by_zone().0.iter().enumerate().filter_map(|(zone, r)| Some((zone, (*r)?)))
         {
             svg += &mark(x(middle(zone)) + 0.5 * shift * step, y(reading.value));
         }
-        let at = left + 8.0 + 96.0 * k as f64;
+        let at = left + 8.0 + pitch * k as f64;
         let _ = write!(
             svg,
             "{}<text x=\"{:.1}\" y=\"11\">{}</text>",
@@ -182,7 +186,7 @@ pub(super) fn profile(m: &MemberPrediction) -> String {
         );
     }
     if m.truth.as_ref().is_some_and(|t| t.zones.is_some()) {
-        let at = left + 8.0 + 96.0 * m.evidence.len() as f64;
+        let at = left + 8.0 + pitch * m.evidence.len() as f64;
         let _ = write!(
             svg,
             "<path d=\"M{:.1} 7h12\" class=\"true\"/><text x=\"{:.1}\" y=\"11\">truth</text>",

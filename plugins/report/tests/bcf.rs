@@ -255,7 +255,7 @@ fn the_report_comes_with_its_topics_and_names_them() {
     let folder = tempfile::tempdir().unwrap();
     let mut document = Document::of(&scene, prediction);
     let provenance = Provenance { date: "2026-05-04 14:20 UTC".into(), ..Provenance::default() };
-    write(folder.path(), &scene, &mut document, &[], None, &provenance).unwrap();
+    write(folder.path(), &scene, &mut document, &[], None, &provenance, None).unwrap();
     let bytes = std::fs::read(folder.path().join("damage.bcf")).unwrap();
     let (prediction, basis) = (&document.prediction, &document.basis);
     let again = bcf(&scene, prediction, basis, &provenance.date, Version::default()).unwrap();

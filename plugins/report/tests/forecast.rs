@@ -60,6 +60,7 @@ fn salt_without_numbers_is_assumed_with_its_spread() {
         &[],
         None,
         &intrados_report::Provenance::default(),
+        None,
     )
     .unwrap();
     let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();

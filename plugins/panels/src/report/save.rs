@@ -6,7 +6,7 @@ use bevy_ecs::prelude::*;
 use egui::{Button, TextEdit, Ui};
 use intrados_light::LitScene;
 use intrados_predict::Prediction;
-use intrados_report::{Record, RecordError, pdf};
+use intrados_report::{Record, RecordError};
 use intrados_scene::Scene;
 use intrados_stage::{Cancelled, Job, Jobs, Task, aside};
 
@@ -77,17 +77,11 @@ pub(crate) fn save_report(
     jobs: &mut Jobs,
 ) -> Task<Result<String, String>> {
     let command = format!("intrados predict {} --out {}", scene.name, folder.display());
-    let record = Record { command, ..Record::default() };
+    let record = Record { command, pdf: with_pdf, ..Record::default() };
     Task::spawn(jobs, format!("writing {}", folder.display()), move |job| {
         let files = aside(|| write(&record, &folder, scene, &prediction, job))
             .map_err(|e| e.to_string())?;
-        if !with_pdf {
-            return Ok(format!("{files} files into {}", folder.display()));
-        }
-        job.relabel("printing report.pdf");
-        let [html, to] = ["report.html", "report.pdf"].map(|name| folder.join(name));
-        pdf::print(&html, &to, job).map_err(|e| e.to_string())?;
-        Ok(format!("{files} files and report.pdf into {}", folder.display()))
+        Ok(format!("{files} files into {}", folder.display()))
     })
 }
 
@@ -115,7 +109,7 @@ pub(crate) fn take(mut report: ResMut<Report>, mut banners: ResMut<Banners>, mut
         Err(RecordError::Cancelled(Cancelled)) => {
             log.say(format!("writing {folder} was cancelled"))
         }
-        Err(error @ (RecordError::Write(_) | RecordError::Model(_))) => {
+        Err(error) => {
             log.say(format!("⚠ not saved: {error}"));
             banners.cannot("Not saved", &error.to_string());
         }

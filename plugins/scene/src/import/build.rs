@@ -14,6 +14,7 @@ use super::{
     course, grade,
     kind::{By, Verdict, kind},
     model::material,
+    ring::{Piece, joined},
     shape::{Tube, boxed, tube},
     source::{Course, Element, Source, Surface},
 };
@@ -68,6 +69,8 @@ pub(super) struct Found {
     pub(super) is_round: bool,
     pub(super) volume: f64,
     pub(super) tube: Option<Tube>,
+    /// Of a lining that closes a ring: the names of its segments.
+    pub(super) segments: Vec<String>,
     /// Lines of steel in it.
     pub(super) steel: usize,
     /// Those of them that are no links.
@@ -90,9 +93,8 @@ pub(super) fn build(source: &Source, model: Model, job: &Job) -> Result<Built, C
         renamed: Vec::new(),
     };
     builder.clear();
-    let mut steel = Vec::new();
+    let mut pieces = Vec::with_capacity(source.elements.len());
     let mut open = 0;
-    let unit = source.metres_per_unit;
     for (i, element) in source.elements.iter().enumerate() {
         job.step(i, source.elements.len())?;
         let mut element = element.clone();
@@ -105,13 +107,18 @@ pub(super) fn build(source: &Source, model: Model, job: &Job) -> Result<Built, C
         {
             open += 1;
         }
-        let (solid, round) = (boxed(&element.surface), tube(&element.surface));
-        match kind(&element, solid.as_ref(), round.as_ref()) {
-            Verdict::Steel(_) => steel.push(element),
-            Verdict::Member(kind, by) if !element.surface.is_empty() => {
-                builder.member(&element, kind, by, round, unit);
+        let (solid, tube) = (boxed(&element.surface), tube(&element.surface));
+        let verdict = kind(&element, solid.as_ref(), tube.as_ref());
+        pieces.push(Piece { element, verdict, tube, segments: Vec::new() });
+    }
+    let mut steel = Vec::new();
+    for piece in joined(pieces) {
+        match piece.verdict {
+            Verdict::Steel(_) => steel.push(piece.element),
+            Verdict::Member(kind, by) if !piece.element.surface.is_empty() => {
+                builder.member(piece, kind, by, source.metres_per_unit);
             }
-            Verdict::Member(..) | Verdict::Scenery => builder.scenery(&element),
+            Verdict::Member(..) | Verdict::Scenery => builder.scenery(&piece.element),
         }
     }
     for (i, element) in steel.iter().enumerate() {
@@ -159,6 +166,15 @@ impl Builder {
                 self.renamed.len()
             ));
         }
+        let rings = || self.built.found.iter().filter(|f| !f.segments.is_empty());
+        if let Some(first) = rings().next() {
+            self.built.notes.push(format!(
+                "segments close rings ({}, such as \"{}\" of {}): each is computed as one lining with monolithic joints, since pressure all around keeps joints shut; where bending opens them, it bends like (4/n)² of that section for n segments (Muir Wood 1975, n > 4)",
+                rings().count(),
+                first.name,
+                first.segments.len()
+            ));
+        }
         for found in self.built.found.iter().filter(|f| f.steel > 0 && f.bars == 0) {
             let links = found.steel;
             self.built.notes.push(format!(
@@ -197,12 +213,12 @@ impl Builder {
 
     fn member(
         &mut self,
-        element: &Element,
+        Piece { element, tube, segments, .. }: Piece,
         kind: MemberKind,
         by: By,
-        tube: Option<Tube>,
         unit: f64,
     ) {
+        let element = &element;
         let Some(solid) = boxed(&element.surface) else { return };
         let stated = element
             .said
@@ -265,6 +281,7 @@ impl Builder {
             is_round,
             volume,
             tube: tube.filter(|_| kind == MemberKind::Lining),
+            segments,
             steel: 0,
             bars: 0,
         });

@@ -19,6 +19,7 @@ mod ground;
 mod kind;
 mod model;
 mod project;
+mod ring;
 mod shape;
 mod source;
 

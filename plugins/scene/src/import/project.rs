@@ -305,7 +305,7 @@ fn concretes(members: &[Detail]) -> String {
 fn detail_text(member: &Detail) -> String {
     let found = member.found;
     let mut text = format!(
-        "        // {} {}{}: {:.2} m, {:.2} by {:.2} m across, {:.3} m³{}\n",
+        "        // {} {}{}: {:.2} m, {:.2} by {:.2} m across, {:.3} m³{}{}\n",
         word(found.kind),
         comment(&quoted(&found.name)),
         if found.class.is_empty() { String::new() } else { format!(" ({})", found.class) },
@@ -313,7 +313,8 @@ fn detail_text(member: &Detail) -> String {
         found.across[0],
         found.across[1],
         found.volume,
-        if found.steel > 0 { format!(", {} bars", found.steel) } else { String::new() }
+        if found.steel > 0 { format!(", {} bars", found.steel) } else { String::new() },
+        of_segments(found)
     );
     let _ = write!(
         text,
@@ -339,7 +340,7 @@ fn detail_text(member: &Detail) -> String {
             if found.steel == 0 { lining(member, tube.inner, thickness) } else { String::new() };
         let _ = write!(
             text,
-            ",\n            body: Tunnel(radius_m: {:.4}, length_m: {length:.4}, inner_lining: (thickness_m: {thickness:.4}{laid}), ground: (model: Springs(radial_mpa_m: 40)))",
+            ",\n            body: Tunnel(radius_m: {:.4}, length_m: {length:.4}, inner_lining: (thickness_m: {thickness:.4}{laid}), ground: (model: Springs(radial_mpa_m: 40, tangential_mpa_m: 13)))",
             tube.inner
         );
     }
@@ -350,6 +351,14 @@ fn detail_text(member: &Detail) -> String {
         let _ = write!(text, ",\n            assumed: [{}]", assume::listed(&member.assumed));
     }
     text + "),\n"
+}
+
+/// The segments of a ring that they close.
+fn of_segments(found: &Found) -> String {
+    match &found.segments[..] {
+        [] => String::new(),
+        some => format!(", of the segments {}", comment(&some.join(", "))),
+    }
 }
 
 /// Hoops and bars of a lining: at each face half of .002 A_c around and half of .001 A_c along

@@ -402,9 +402,12 @@ pub(crate) struct Evidence {
 }
 
 /// A file of evidence in which nothing is said yet: of what (`name`), with examples for the member
-/// `id` as comments. Both in the form that RON takes within quotes.
+/// `id` as comments. Both in the form that RON takes within quotes. Sides are angles, since no face
+/// has the same name on all members.
 pub(crate) fn skeleton(name: &str, id: &str) -> String {
-    SKELETON.replace("NAME", name).replace("C1", id)
+    let sides = [("face: Front,", "angle_deg: 0,"), ("face: Right,", "angle_deg: 90,")];
+    let any = sides.iter().fold(SKELETON.to_owned(), |text, (face, side)| text.replace(face, side));
+    any.replace("NAME", name).replace("C1", id)
 }
 
 /// The same for a scene `NAME.ron` alone, which no command writes.
@@ -560,6 +563,10 @@ mod tests {
             file.items.iter().map(|item| item.shows.kind()).collect();
         assert_eq!(kinds.len(), 14, "one of every kind: {kinds:?}");
         assert_eq!(file.photographs.len(), 1);
+        let any = parse("e.ron", &skeleton("bridge.ifc", "P/1").replace("// (", "(")).unwrap();
+        assert_eq!([any.items.len(), any.tables.len()], [15, 4]);
+        assert!(any.items.iter().all(|item| item.face.is_none()), "a face that some have not");
+        assert!(any.tables.iter().all(|table| table.face.is_none()), "a face that some have not");
         assert_eq!([file.tests.len(), file.gauges.len(), file.readings.len()], [1, 1, 1]);
     }
 }
