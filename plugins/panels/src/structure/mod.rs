@@ -136,9 +136,9 @@ fn tools(ui: &mut Ui, structure: &mut Structure, selection: Selection, actions: 
             ui.toggle_value(&mut structure.names, "Names")
                 .on_hover_text("Name and damage of every member, the worst first");
             let mut is_cut = structure.section.is_some();
-            let hint = "Cuts the structure open by a plane";
+            let hint = "Cuts it open, through the middle of the selected member";
             if ui.toggle_value(&mut is_cut, "Section").on_hover_text(hint).changed() {
-                structure.section = is_cut.then(Section::default);
+                structure.section = is_cut.then(|| structure.model.section(selection.0));
             }
             let hint = "The distance between two places that are clicked";
             let tape = ui.toggle_value(&mut structure.tape.is_on, "Measure");

@@ -210,11 +210,24 @@ impl Model {
         }
     }
 
+    /// The middle of what is drawn of a member; none: a section has taken it away.
     fn middle(&self, member: usize) -> Option<Vec3> {
-        let own = self.facets.iter().filter(|f| f.member == member);
+        let [low, high] = Self::bounds_of(member, &self.shown.as_ref()?.facets)?;
+        Some(0.5 * (low + high))
+    }
+
+    fn bounds_of(member: usize, facets: &[Facet]) -> Option<[Vec3; 2]> {
+        let own = facets.iter().filter(|f| f.member == member);
         let points: Vec<Vec3> = own.flat_map(|f| f.corners).collect();
-        let [low, high] = bounds(&points);
-        (!points.is_empty()).then(|| 0.5 * (low + high))
+        (!points.is_empty()).then(|| bounds(&points))
+    }
+
+    /// A section through the middle of a member, or of the structure.
+    pub(super) fn section(&self, member: Option<usize>) -> Section {
+        let whole = self.bounds();
+        let own = member.and_then(|m| Self::bounds_of(m, &self.facets));
+        let [low, high] = own.unwrap_or(whole);
+        Section::through(0.5 * (low + high), whole)
     }
 
     fn redraw(

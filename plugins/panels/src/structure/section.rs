@@ -18,13 +18,14 @@ pub(super) struct Section {
     keeps_far: bool,
 }
 
-impl Default for Section {
-    fn default() -> Self {
-        Self { axis: 2, share: 0.5, keeps_far: false }
-    }
-}
-
 impl Section {
+    /// Through a point of a structure of these bounds, across z; what lies before it is taken away.
+    pub(super) fn through(at: Vec3, [low, high]: [Vec3; 2]) -> Self {
+        let share = (at.z - low.z) / (high.z - low.z);
+        let share = if share.is_finite() { share.clamp(0.0, 1.0) } else { 0.5 };
+        Self { axis: 2, share, keeps_far: false }
+    }
+
     /// Its place on the axis, m, in a structure of these bounds.
     fn level(&self, [low, high]: [Vec3; 2]) -> f32 {
         let axis = self.normal();
