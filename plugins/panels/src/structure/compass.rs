@@ -18,7 +18,7 @@ pub(super) fn draw(ui: &Ui, rect: Rect, camera: &Camera) {
     let middle = rect.left_bottom() + vec2(ARM + 22.0, -(ARM + 62.0));
     let painter = ui.painter().with_clip_rect(rect);
     let font = egui::TextStyle::Small.resolve(ui.style());
-    painter.circle_filled(middle, ARM + 16.0, Color32::from_black_alpha(120));
+    painter.circle_filled(middle, ARM + 16.0, Color32::from_black_alpha(190));
     let mut axes = AXES;
     // The farthest first.
     axes.sort_by(|a, b| b.1.dot(forward).total_cmp(&a.1.dot(forward)));

@@ -48,7 +48,9 @@ impl Section {
     pub(super) fn tools(&mut self, ui: &mut Ui, bounds: [Vec3; 2]) {
         ui.label("Cut across");
         for (index, (name, _)) in AXES.iter().enumerate() {
-            ui.selectable_value(&mut self.axis, index, *name);
+            if ui.selectable_value(&mut self.axis, index, *name).changed() {
+                self.share = 0.5;
+            }
         }
         let label = ui.label("at");
         let axis = self.normal();
