@@ -42,7 +42,8 @@ fn take(session: &Session, args: &args::Screenshot) -> Result<Outcome, Failure> 
         out: args.out.clone(),
     };
     // Nothing of how the user has arranged his own window is in it, and nothing of it is changed.
-    let panels = PanelsPlugin { recent: None, layout: None, ..PanelsPlugin::desktop() };
+    let panels =
+        PanelsPlugin { recent: None, layout: None, session: None, ..PanelsPlugin::desktop() };
     take_shot(super::view::builder(session, panels), shot)
         .map_err(|e| Failure::Internal(format!("no picture: {e:#}")))?;
     Ok(Outcome::Done)

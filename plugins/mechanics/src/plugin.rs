@@ -11,7 +11,7 @@ use intrados_stage::{Job, Jobs, Stage, Task, Unfinished, Work, alone};
 use crate::{
     analysis::{Outcome, analyze},
     frame::joined,
-    member::{Meshing, prepare_within},
+    member::{Along, Meshing, prepare_within},
     model::{Failure, MarchSettings},
     skin::{Looking, Seen},
     sparse::SolveError,
@@ -24,6 +24,8 @@ pub struct Analyze {
     pub model: String,
     /// How finely.
     pub meshing: Meshing,
+    /// Whether its loads are raised after its life, until it fails.
+    pub to_failure: bool,
 }
 
 /// Asks an analysis to stop. What it has found so far stays to be looked at.
@@ -121,8 +123,12 @@ fn life(scene: &Scene, wish: &Analyze, seen: Seen, job: &Job) -> Result<Life, Un
     let whole = joined(scene, job).map_err(|e| failed(&e))?;
     let handed = whole.as_ref().and_then(|whole| whole.handed(&assembly.id));
     job.relabel(label(scene, &wish.model));
-    let prepared =
+    let mut prepared =
         prepare_within(scene, assembly, handed, wish.meshing, job).map_err(|e| failed(&e))?;
+    if wish.to_failure && !prepared.raise(&raised(scene), Along::Automatic) {
+        let why = "no force, pressure or displacement acts on it that could be raised: add a load";
+        return Err(Unfinished::Because(why.into()));
+    }
     let mut looking = Looking::new(&prepared, seen);
     match analyze(&prepared, MarchSettings::of_life(), job, &mut looking) {
         Ok((outcome, _)) => Ok(Life { outcome: Arc::new(outcome), damage: looking.damage }),
@@ -131,6 +137,12 @@ fn life(scene: &Scene, wish: &Analyze, seen: Seen, job: &Job) -> Result<Life, Un
         }
         Err(other) => Err(because(&other)),
     }
+}
+
+/// Loads that can be raised to failure.
+fn raised(scene: &Scene) -> Vec<&str> {
+    let loads = scene.structure.loads.iter().filter(|l| l.action.can_be_raised());
+    loads.map(|l| l.name.as_str()).collect()
 }
 
 fn stop(mut wishes: MessageReader<Stop>, analyses: Res<Analyses>) {

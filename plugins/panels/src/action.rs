@@ -6,8 +6,8 @@ use bevy_ecs::prelude::*;
 use intrados_light::{RenderSettings, View};
 use intrados_predict::Progress;
 use intrados_scene::{
-    attach::Attachment,
-    plugin::{CurrentScene, OpenScene},
+    attach::{Attachment, Face},
+    plugin::{CurrentScene, OpenAsProject, OpenScene},
 };
 
 use crate::{
@@ -33,6 +33,9 @@ pub enum Action {
     Choose,
     /// Open a file, or a bundled scene by its name.
     Open(PathBuf),
+    /// Make a project of the model that is open, in a folder beside it, and open that: only a
+    /// project has a place for evidence.
+    MakeProject,
     /// Open what is open once more: in a world built anew where a [`Window`](crate::Window) holds
     /// it.
     Reload,
@@ -82,8 +85,9 @@ pub enum Action {
     Photograph(PathBuf),
     /// Choose a photograph in a dialog.
     ChoosePhotograph,
-    /// Fill in what is attached to the selected member, with files that were given already.
-    Fill(Vec<PathBuf>),
+    /// Fill in what is attached to the selected member, with files that were given already, and
+    /// where it is: a share of its axis, and a face.
+    Fill(Vec<PathBuf>, Option<(f32, Option<Face>)>),
     /// Choose files for that form in a dialog.
     ChooseEvidence,
     /// Attach evidence, as `intrados attach` does.
@@ -169,6 +173,11 @@ fn carry_out(world: &mut World, action: Action) {
             }
         }
         Action::Open(path) => open(world, path),
+        Action::MakeProject => {
+            if let Some(model) = world.get_resource::<CurrentScene>().map(|s| s.0.path.clone()) {
+                world.write_message(OpenAsProject(model));
+            }
+        }
         Action::Reload => {
             if let Some(path) = world.resource::<Layout>().asked.clone() {
                 open(world, path);
@@ -234,7 +243,7 @@ fn carry_out(world: &mut World, action: Action) {
         }
         Action::ChoosePhotograph => Dialogs::open(world, Purpose::Photograph),
         Action::ChooseEvidence => Dialogs::open(world, Purpose::Evidence),
-        Action::Fill(files) => fill(world, files),
+        Action::Fill(files, place) => fill(world, files, place),
         Action::Attach(what) => edits::begin(world, Edit::Attach(what)),
         Action::Detach(member, name) => edits::begin(world, Edit::Detach { member, name }),
         Action::Undo => edits::begin(world, Edit::Undo),
@@ -254,12 +263,18 @@ fn carry_out(world: &mut World, action: Action) {
 }
 
 /// Opens the form of evidence for the selected member.
-fn fill(world: &mut World, files: Vec<PathBuf>) {
+fn fill(world: &mut World, files: Vec<PathBuf>, place: Option<(f32, Option<Face>)>) {
     let selected = world.resource::<Selection>().0;
     let scene = world.get_resource::<CurrentScene>().map(|s| s.0.clone());
     let member = scene.as_ref().and_then(|s| s.members.get(selected?));
     match member {
-        Some(member) => world.resource_mut::<Form>().begin(&member.id, files),
+        Some(member) => {
+            let mut form = world.resource_mut::<Form>();
+            form.begin(&member.id, files);
+            if let Some((along, face)) = place {
+                form.put_at(along, face);
+            }
+        }
         None => world
             .resource_mut::<Banners>()
             .cannot("Attached to which member?", "select one first, in the picture or in the list"),

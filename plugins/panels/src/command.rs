@@ -78,7 +78,7 @@ fn fixed(look: &Look) -> Vec<Command> {
             None,
             Action::Save(Taken::Picture(Some("Structure".into()))),
         ),
-        command("attach evidence", "A", by(NONE, Key::A), Action::Fill(Vec::new())),
+        command("attach evidence", "A", by(NONE, Key::A), Action::Fill(Vec::new(), None)),
         // Before the one that asks for less: Ctrl+Z alone would take Shift along.
         command("redo", "Ctrl+Shift+Z  Ctrl+Y", by(shifted, Key::Z), Action::Redo),
         command("undo", "Ctrl+Z", by(CTRL, Key::Z), Action::Undo),

@@ -8,12 +8,7 @@ use std::{
 use bevy_ecs::prelude::*;
 use intrados_stage::{Jobs, Task};
 
-use crate::{
-    Action, Actions, Banners, Log,
-    attach::{self, Form},
-    export::Export,
-    saving::Saving,
-};
+use crate::{Action, Actions, Banners, Log, attach::Form, export::Export, saving::Saving};
 
 /// A dialog that is gone sooner than anybody can click was never there.
 const TOO_SOON: Duration = Duration::from_millis(400);
@@ -152,7 +147,7 @@ pub(crate) fn take(
     let Some(chosen) = task.poll() else { return };
     let mut chosen = chosen.unwrap_or_default();
     if matches!(purpose, Purpose::Evidence) && !chosen.is_empty() {
-        attach::add(&mut form, chosen);
+        form.add(chosen);
         dialogs.open = None;
         return;
     }

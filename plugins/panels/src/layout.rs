@@ -14,7 +14,6 @@ use intrados_light::{
 use intrados_predict::Progress;
 use intrados_scene::{
     LoadError,
-    attach::What,
     plugin::{CurrentScene, SceneChanged, SceneFailed},
 };
 use intrados_stage::{Jobs, Pace, catch};
@@ -24,7 +23,8 @@ use crate::{
     attach::{self, Form},
     banner, command,
     ct::Ct,
-    dialog::{self, Dialogs},
+    dialog::Dialogs,
+    drops,
     edits::Edits,
     export::{self, Export},
     fields::Fields,
@@ -36,7 +36,7 @@ use crate::{
     recent::Recent,
     report::Report,
     saving::{self, Saving},
-    start,
+    session, start,
     stress::Stress,
     toast,
     workspace::{self, Desk},
@@ -164,13 +164,14 @@ pub fn is_busy(world: &mut World) -> bool {
 
 /// Draws the whole window.
 pub fn show(ui: &mut Ui, world: &mut World) {
-    drops(ui, world);
+    drops::take(ui, world);
     world.resource_mut::<Layout>().bypass_change_detection().tell(ui);
     workspace::dress(ui, world);
     // Before the keys: while it is open, it takes them.
     command::palette(ui, world);
     command::keys(ui, world);
     let [start, sheet, form, saving] = own(world);
+    session::offer(ui, world);
     banner::show(ui, world);
     if world.contains_resource::<CurrentScene>() && !world.resource::<Layout>().start {
         panels(ui, world);
@@ -180,43 +181,7 @@ pub fn show(ui: &mut Ui, world: &mut World) {
     sheets(ui, world, [sheet, form, saving]);
     saving::picture(ui, world);
     toast::show(ui, world);
-    if ui.input(|i| !i.raw.hovered_files.is_empty()) {
-        drop_here(ui);
-    }
-}
-
-/// What was let go over the window: evidence belongs to the selected member, a photograph is placed
-/// first, a model is opened.
-fn drops(ui: &Ui, world: &mut World) {
-    let dropped: Vec<PathBuf> =
-        ui.input(|i| i.raw.dropped_files.iter().map(|f| f.path().to_owned()).collect());
-    let Some(last) = dropped.last() else { return };
-    let is_open = world.contains_resource::<CurrentScene>();
-    let has_member = world.resource::<Selection>().0.is_some();
-    let evidence: Option<Vec<Vec<PathBuf>>> = dropped.iter().map(|p| attach::evidence(p)).collect();
-    let is_table = What::is_table(last) == Some(true);
-    let action = match evidence {
-        Some(files) if is_open && (has_member || is_table) => Action::Fill(files.concat()),
-        _ if is_open && dialog::is_photograph(last) => Action::Photograph(last.clone()),
-        _ => Action::Open(last.clone()),
-    };
-    world.resource_mut::<Actions>().ask(action);
-}
-
-/// While a file hangs over the window.
-fn drop_here(ui: &Ui) {
-    let rect = ui.ctx().content_rect();
-    let painter = ui
-        .ctx()
-        .layer_painter(egui::LayerId::new(egui::Order::Foreground, egui::Id::unique("drop here")));
-    painter.rect_filled(rect, 0.0, egui::Color32::from_black_alpha(190));
-    painter.text(
-        rect.center(),
-        egui::Align2::CENTER_CENTER,
-        "Drop to open",
-        egui::FontId::proportional(30.0),
-        egui::Color32::WHITE,
-    );
+    drops::hint(ui, world);
 }
 
 fn own(world: &mut World) -> [SystemId<InMut<'static, Ui>>; 4] {
@@ -395,7 +360,7 @@ fn edits(world: &World, is_open: bool) -> [(String, &'static str, bool, Action);
     [
         (named("Undo", undo), "Ctrl+Z", is_free && undo.is_some(), Action::Undo),
         (named("Redo", redo), "Ctrl+Shift+Z", is_free && redo.is_some(), Action::Redo),
-        ("Attach evidence…".into(), "A", has_member, Action::Fill(Vec::new())),
+        ("Attach evidence…".into(), "A", has_member, Action::Fill(Vec::new(), None)),
     ]
 }
 

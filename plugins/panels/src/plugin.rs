@@ -8,10 +8,10 @@ use intrados_stage::Stage;
 
 use crate::{
     Actions, AddPanel, Banners, Latest, Log, Look, Place, Refine, Selection, Statistics, Viewpoint,
-    action, attach, banner, command, convergence, ct, dialog, directions, edits, export, fields,
-    inspector, layout, log, members, meters, outline, photos, picture, place::Panels, prediction,
-    recent, refine, render, report, saving, sheet, statistics, steering, stress, structure, toast,
-    viewpoint, workspace,
+    action, attach, banner, command, convergence, ct, dialog, directions, drops, edits, export,
+    fields, inspector, layout, log, members, meters, outline, photos, picture, place::Panels,
+    prediction, recent, refine, render, report, saving, session, sheet, statistics, steering,
+    stress, structure, toast, viewpoint, workspace,
 };
 
 /// Adds the window's state and the built-in panels. It opens no window: whoever has one calls
@@ -24,6 +24,9 @@ pub struct PanelsPlugin {
     pub recent: Option<PathBuf>,
     /// Where it is kept how panels lie, and the theme; `None`: nowhere.
     pub layout: Option<PathBuf>,
+    /// Where it is kept what is open and saved nowhere, for the case that the program breaks off;
+    /// `None`: nowhere.
+    pub session: Option<PathBuf>,
     /// Whether the system's file dialogs may be opened.
     pub dialogs: bool,
 }
@@ -34,8 +37,8 @@ impl PanelsPlugin {
     #[must_use]
     pub fn desktop() -> Self {
         let file = |name| dirs::data_dir().map(|d| d.join("intrados").join(name));
-        let (recent, layout) = (file("recent.json"), file("layout.json"));
-        Self { slice: Some(Duration::from_millis(8)), recent, layout, dialogs: true }
+        let [recent, layout, session] = ["recent.json", "layout.json", "session.json"].map(file);
+        Self { slice: Some(Duration::from_millis(8)), recent, layout, session, dialogs: true }
     }
 }
 
@@ -65,6 +68,7 @@ impl Plugin for PanelsPlugin {
             .init_resource::<command::Palette>()
             .init_resource::<sheet::Listing>()
             .init_resource::<attach::Form>()
+            .init_resource::<drops::Drops>()
             .init_resource::<edits::Edits>()
             .init_resource::<toast::Toasts>()
             .init_resource::<saving::Saving>()
@@ -72,6 +76,7 @@ impl Plugin for PanelsPlugin {
             .insert_resource(workspace::Desk::read(self.layout.clone()))
             .insert_resource(intrados_light::plugin::Widening(stress::WIDENING))
             .insert_resource(Refine::new(self.slice))
+            .insert_resource(session::Session::read(self.session.clone()))
             .insert_resource(recent::Recent::read(self.recent.clone()))
             .add_systems(
                 Update,
@@ -94,6 +99,7 @@ impl Plugin for PanelsPlugin {
                     report::take,
                     edits::take,
                     saving::take,
+                    session::keep,
                     banner::gather,
                 )
                     .chain()

@@ -5,7 +5,7 @@ use bevy_ecs::world::World;
 use egui::Ui;
 use intrados_stage::{Fault, catch};
 
-use crate::{Action, Actions, Banners, Log, banner, layout, recent::Recent};
+use crate::{Action, Actions, Banners, Log, banner, layout, recent::Recent, session::Session};
 
 /// An app with panels that outlives a panic in any of its systems.
 ///
@@ -74,6 +74,7 @@ impl Window {
         let (from, to) = (old.world_mut(), self.app.world_mut());
         *to.resource_mut::<Log>() = std::mem::take(&mut *from.resource_mut::<Log>());
         *to.resource_mut::<Recent>() = std::mem::take(&mut *from.resource_mut::<Recent>());
+        *to.resource_mut::<Session>() = std::mem::take(&mut *from.resource_mut::<Session>());
         let asked = from.resource_mut::<layout::Layout>().asked.take();
         to.resource_mut::<layout::Layout>().asked = asked;
         // What broke may break once more while it goes.

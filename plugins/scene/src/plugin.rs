@@ -20,6 +20,11 @@ use crate::{
 #[derive(Message, Debug, Clone, PartialEq, Eq)]
 pub struct OpenScene(pub PathBuf);
 
+/// Asks for a model (glTF, IFC) as a project of its own, in a folder beside it: only there evidence
+/// has a place. One that was made before is opened as it is.
+#[derive(Message, Debug, Clone, PartialEq, Eq)]
+pub struct OpenAsProject(pub PathBuf);
+
 /// Another scene is in [`CurrentScene`], and its entities are there.
 #[derive(Message, Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SceneChanged;
@@ -55,6 +60,7 @@ impl Plugin for ScenePlugin {
             .init_resource::<Access>()
             .init_resource::<Jobs>()
             .add_message::<OpenScene>()
+            .add_message::<OpenAsProject>()
             .add_message::<SceneChanged>()
             .add_message::<SceneFailed>()
             .add_systems(Update, (start_loading, finish_loading).chain().in_set(Stage::Load));
@@ -85,25 +91,33 @@ fn spawn<T: Component + Clone>(world: &mut World, list: &[T]) {
 
 fn start_loading(
     mut wishes: MessageReader<OpenScene>,
+    mut projects: MessageReader<OpenAsProject>,
     loading: ResMut<Loading>,
     access: Res<Access>,
     mut jobs: ResMut<Jobs>,
 ) {
-    let Some(OpenScene(path)) = wishes.read().last().cloned() else { return };
+    let scene = wishes.read().last().map(|wish| (wish.0.clone(), is_ifc(&wish.0)));
+    let project = projects.read().last().map(|wish| (wish.0.clone(), true));
+    let Some((path, is_imported)) = project.or(scene) else { return };
     let access = access.clone();
     let task = Task::spawn(&mut jobs, format!("opening {}", path.display()), move |job| {
-        opened(&path, &access, job)
+        if is_imported {
+            imported(&path, &access, job)
+        } else {
+            Scene::open_within(&path, &access, job)
+        }
     });
     *loading.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(task);
 }
 
-/// A scene, or a model of IFC, which is imported into a folder beside it first: `bridge.ifc` into
-/// `bridge.intrados`. Where nothing can be written there, the folder lies among the temporary ones.
+/// IFC is no scene: it is always imported.
+fn is_ifc(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("ifc"))
+}
+
+/// A model that is imported into a folder beside it: `bridge.ifc` into `bridge.intrados`. Where nothing can be written there, the folder lies among the temporary ones.
 /// What was imported before, and may have been edited, is opened as it is.
-fn opened(path: &Path, access: &Access, job: &Job) -> Result<Scene, LoadError> {
-    if !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("ifc")) {
-        return Scene::open_within(path, access, job);
-    }
+fn imported(path: &Path, access: &Access, job: &Job) -> Result<Scene, LoadError> {
     let beside = path.with_extension("intrados");
     // Two models of one name are not to meet there.
     let whole = path.canonicalize().unwrap_or_else(|_| path.into());

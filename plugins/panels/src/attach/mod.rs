@@ -13,16 +13,28 @@ use intrados_scene::{
     plugin::CurrentScene,
     structure::{Course, Electrode},
 };
+use serde::{Deserialize, Serialize};
 
 use crate::{Action, Actions, Selection, dialog};
 
 /// What is being attached.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 enum Sort {
     Finding,
     Slices,
     Stack,
     Table,
+}
+
+impl Sort {
+    /// What files are by their names; without any, a finding.
+    fn of(files: &[PathBuf]) -> Self {
+        match files.first() {
+            None => Self::Finding,
+            Some(file) if What::is_table(file) == Some(true) => Self::Table,
+            Some(_) => Self::Slices,
+        }
+    }
 }
 
 /// Findings that can be noted, by what a site's form calls them, and what is measured of them.
@@ -67,7 +79,8 @@ const FACES: [Face; 8] = [
 ];
 
 /// What has been filled in. Numbers are as they were typed.
-#[derive(Resource, Debug, Clone, Default)]
+#[derive(Resource, Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub(crate) struct Form {
     pub(crate) is_open: bool,
     /// Id of the member.
@@ -101,13 +114,23 @@ pub(crate) struct Form {
 impl Form {
     /// Opens it for a member and what was dropped on the window.
     pub(crate) fn begin(&mut self, member: &str, files: Vec<PathBuf>) {
-        let sort = match files.first() {
-            None => Sort::Finding,
-            Some(file) if What::is_table(file) == Some(true) => Sort::Table,
-            Some(_) => Sort::Slices,
-        };
-        let picture = Self::default();
-        *self = Self { is_open: true, member: member.into(), sort: Some(sort), files, ..picture };
+        let sort = Some(Sort::of(&files));
+        *self = Self { is_open: true, member: member.into(), sort, files, ..Self::default() };
+    }
+
+    /// Says where on the member it is, as somebody has shown it there.
+    pub(crate) fn put_at(&mut self, along: f32, face: Option<Face>) {
+        self.from = format!("{along:.3}");
+        self.to.clear();
+        self.face = face.or(self.face);
+    }
+
+    /// More files, from a dialog or let go over the window.
+    pub(crate) fn add(&mut self, files: Vec<PathBuf>) {
+        if self.sort == Some(Sort::Finding) {
+            self.sort = Some(Sort::of(&files));
+        }
+        self.files.extend(files);
     }
 }
 
@@ -138,6 +161,7 @@ pub(crate) fn form(
         form.member.clone_from(&member.id);
     }
     ui.strong(format!("to {}", scene.0.name_of(&form.member)));
+    ui.weak("A click on the member in the picture says where on it.");
     ui.horizontal_wrapped(|ui| {
         for (sort, name) in [
             (Sort::Finding, "A finding"),
@@ -175,8 +199,17 @@ fn fields(ui: &mut Ui, form: &mut Form, actions: &mut Actions) {
 /// The button, and what keeps it from being pressed.
 fn send(ui: &mut Ui, form: &mut Form, scene: &Scene, actions: &mut Actions) {
     let filled = form.attachment();
+    let is_model = scene.path.extension().is_some_and(|e| !e.eq_ignore_ascii_case("ron"));
+    if is_model {
+        ui.horizontal_wrapped(|ui| {
+            ui.label("This is a model alone. Its project, in a folder beside it, holds evidence.");
+            if ui.button("Make its project").clicked() {
+                actions.ask(Action::MakeProject);
+            }
+        });
+    }
     ui.horizontal_wrapped(|ui| {
-        let may = filled.is_ok() && scene.path.exists();
+        let may = filled.is_ok() && scene.path.exists() && !is_model;
         if ui.add_enabled(may, egui::Button::new("Attach")).clicked()
             && let Ok(what) = &filled
         {
@@ -225,11 +258,6 @@ fn files(ui: &mut Ui, form: &mut Form, actions: &mut Actions) {
         actions.ask(Action::Photograph(file.clone()));
         form.is_open = false;
     }
-}
-
-/// Adds files that a dialog has brought.
-pub(crate) fn add(form: &mut Form, files: Vec<PathBuf>) {
-    form.files.extend(files);
 }
 
 /// A field of text with its name.

@@ -12,11 +12,11 @@ use egui::{ComboBox, Rect, ScrollArea, TextureHandle, TextureOptions, Ui, pos2};
 use glam::DVec3;
 use intrados_photo::{Located, Pick};
 use intrados_scene::{Member, Scene, plugin::CurrentScene, structure::Photographed};
-use intrados_stage::{Access, Jobs, Task};
+use intrados_stage::{Jobs, Task};
 use model::Turn;
 use work::{Face, Opened, Picked, Placed};
 
-use crate::{Action, Actions, Banners, Log, Selection, Viewpoint, members, zoom::Zoom};
+use crate::{Action, Actions, Selection, Viewpoint, members, zoom::Zoom};
 
 /// Width of what stands beside the photograph, points.
 const ASIDE: f32 = 310.0;
@@ -24,6 +24,9 @@ const ASIDE: f32 = 310.0;
 const FEWEST: usize = 4;
 /// From so far a find is looked at in the model, m.
 const NEAR: f64 = 1.2;
+
+/// So many changes of picks can be taken back.
+const MOST: usize = 64;
 
 /// What is open: the scene's hash, the member's id, the photograph.
 type Key = (String, String, PathBuf);
@@ -38,15 +41,17 @@ pub(crate) struct Photos {
     of: Option<Key>,
     opening: Option<Task<Result<Opened, String>>>,
     shot: Option<Result<Shot, String>>,
-    attaching: Option<Task<Result<String, String>>>,
     zoom: Zoom,
     turn: Turn,
     /// The corner that the next click in the photograph is of.
     armed: Option<usize>,
     /// The face that is looked at instead of the photograph.
     face: Option<usize>,
-    /// Member and name of what was added to the evidence: looked at once the scene is there again.
-    added: Option<[String; 2]>,
+    /// The member that a photograph is being attached to, and those that it has already: the new
+    /// one is looked at once the scene is there again.
+    added: Option<(String, Vec<PathBuf>)>,
+    /// Picks of a session that broke off, and the photograph that they are in.
+    left: Option<(PathBuf, Vec<Pick>)>,
     /// The find that was clicked: of which face, which one.
     marked: Option<[usize; 2]>,
 }
@@ -56,6 +61,8 @@ struct Shot {
     opened: Opened,
     texture: TextureHandle,
     picks: Vec<Picked>,
+    /// The picks before each of the last changes.
+    before: Vec<Vec<Picked>>,
     /// Picks have changed since the place was last asked for.
     is_moved: bool,
     is_saved: bool,
@@ -71,7 +78,6 @@ impl Photos {
     pub(crate) fn is_busy(&self) -> bool {
         let shot = self.shot.iter().flatten();
         self.opening.is_some()
-            || self.attaching.is_some()
             || shot.into_iter().any(|s| s.placing.is_some() || s.reading.is_some() || s.is_moved)
     }
 
@@ -79,6 +85,19 @@ impl Photos {
     pub(crate) fn show(&mut self, path: PathBuf) {
         self.path = path.display().to_string();
         self.chosen = Some(path);
+    }
+
+    /// The photograph that is looked at and its picks, as long as they are nowhere else.
+    pub(crate) fn unsaved(&self) -> Option<(PathBuf, Vec<Pick>)> {
+        let shot = self.shot.as_ref()?.as_ref().ok()?;
+        let picks = shot.picks.iter().map(|p| p.pick).collect();
+        (!shot.is_saved && !shot.picks.is_empty()).then(|| (shot.opened.photo.file.clone(), picks))
+    }
+
+    /// Goes on with what another session has left.
+    pub(crate) fn go_on(&mut self, file: PathBuf, picks: Vec<Pick>) {
+        self.show(file.clone());
+        self.left = Some((file, picks));
     }
 }
 
@@ -89,6 +108,7 @@ impl Shot {
 
     /// A corner of the member is there.
     fn pick(&mut self, corner: usize, pixel: [f64; 2]) {
+        self.remember();
         let place = self.opened.outline.corners[corner];
         let picked = Picked { pick: Pick { pixel, place }, corner: Some(corner) };
         match self.picks.iter_mut().find(|p| p.corner == Some(corner)) {
@@ -96,6 +116,20 @@ impl Shot {
             None => self.picks.push(picked),
         }
         self.moved();
+    }
+
+    /// What is picked now can be come back to.
+    fn remember(&mut self) {
+        self.before.push(self.picks.clone());
+        let surplus = self.before.len().saturating_sub(MOST);
+        self.before.drain(..surplus);
+    }
+
+    fn take_back(&mut self) {
+        if let Some(before) = self.before.pop() {
+            self.picks = before;
+            self.moved();
+        }
     }
 
     fn moved(&mut self) {
@@ -166,24 +200,20 @@ pub(crate) fn photos(
     InMut(ui): InMut<Ui>,
     scene: Option<Res<CurrentScene>>,
     selection: Res<Selection>,
-    access: Res<Access>,
     mut photos: ResMut<Photos>,
     mut jobs: ResMut<Jobs>,
     mut actions: ResMut<Actions>,
     mut viewpoint: ResMut<Viewpoint>,
-    mut banners: ResMut<Banners>,
-    mut log: ResMut<Log>,
 ) {
     let photos = photos.bypass_change_detection();
     let Some(scene) = scene else { return };
     let scene = &scene.0;
-    return_to(photos, scene, *selection, &mut actions);
+    go_to_added(photos, scene);
     let Some(member) = selection.0.and_then(|i| scene.members.get(i)) else {
         let none = "This scene has no structural members.";
         let why = "Select the member that a photograph is of:";
         return members::choose(ui, scene, |_| true, why, none, &mut actions);
     };
-    settle(photos, &mut actions, &mut banners, &mut log);
     choose(ui, photos, scene, member, &mut actions);
     ask(photos, scene, member, &mut jobs);
     let area = ui.available_rect_before_wrap();
@@ -210,7 +240,7 @@ pub(crate) fn photos(
     let right = Rect::from_min_max(pos2(left.right() + 8.0, area.top()), area.max);
     sheet::show(ui, photos, left);
     ui.scope_builder(egui::UiBuilder::new().max_rect(right), |ui| {
-        aside(ui, photos, scene, &access, &mut jobs, &mut actions, &mut viewpoint);
+        aside(ui, photos, scene, &mut jobs, &mut actions, &mut viewpoint);
     });
     ui.advance_cursor_after_rect(area);
 }
@@ -310,13 +340,18 @@ fn collect(ui: &Ui, photos: &mut Photos) {
             Ok(Ok(mut opened)) => {
                 let options = TextureOptions::LINEAR;
                 let texture = ui.ctx().load_texture("photo", opened.picture.clone(), options);
-                let picks = std::mem::take(&mut opened.picks);
+                let saved = std::mem::take(&mut opened.picks);
+                let file = &opened.photo.file;
+                let left = photos.left.take_if(|(of, _)| of == file).map(|l| opened.picked(l.1));
+                let (is_saved, picks) =
+                    (left.is_none() && !saved.is_empty(), left.unwrap_or(saved));
                 Ok(Shot {
                     opened,
                     texture,
                     is_moved: !picks.is_empty(),
-                    is_saved: !picks.is_empty(),
+                    is_saved,
                     picks,
+                    before: Vec::new(),
                     placing: None,
                     located: None,
                     reading: None,
@@ -334,31 +369,12 @@ fn collect(ui: &Ui, photos: &mut Photos) {
 }
 
 /// Goes to what was added, after the scene was loaded anew for it.
-fn return_to(photos: &mut Photos, scene: &Scene, selection: Selection, actions: &mut Actions) {
-    let Some([member, name]) = &photos.added else { return };
-    let photo = scene.structure.photographs.iter().find(|p| p.member == *member && p.name == *name);
-    let (Some(photo), None) = (photo, selection.0) else { return };
-    let index = scene.members.iter().position(|m| m.id == *member);
-    photos.chosen = Some(photo.file.clone());
-    photos.added = None;
-    actions.ask(Action::Select(index));
-}
-
-/// What has become of evidence that was added.
-fn settle(photos: &mut Photos, actions: &mut Actions, banners: &mut Banners, log: &mut Log) {
-    match Task::take(&mut photos.attaching) {
-        Some(Ok(Ok(name))) => {
-            log.say(format!("attached {name}"));
-            let member = photos.of.as_ref().map(|(_, member, _)| member.clone());
-            photos.added = member.map(|member| [member, name]);
-            actions.ask(Action::Reload);
-        }
-        Some(Ok(Err(why))) => {
-            log.say(format!("not attached: {why}"));
-            banners.cannot("The photograph was not attached", &why);
-        }
-        Some(Err(_)) => banners.cannot("The photograph was not attached", "the work broke off"),
-        None => {}
+fn go_to_added(photos: &mut Photos, scene: &Scene) {
+    let Some((member, before)) = &photos.added else { return };
+    let mut all = scene.structure.photographs.iter();
+    if let Some(photo) = all.find(|p| p.member == *member && !before.contains(&p.file)) {
+        photos.chosen = Some(photo.file.clone());
+        photos.added = None;
     }
 }
 
@@ -367,13 +383,12 @@ fn aside(
     ui: &mut Ui,
     photos: &mut Photos,
     scene: &Arc<Scene>,
-    access: &Access,
     jobs: &mut Jobs,
     actions: &mut Actions,
     viewpoint: &mut Viewpoint,
 ) {
     let height = (0.4 * ui.available_height()).clamp(90.0, 260.0);
-    let Photos { shot: Some(Ok(shot)), armed, turn, marked, face, attaching, .. } = photos else {
+    let Photos { shot: Some(Ok(shot)), armed, turn, marked, face, added, .. } = photos else {
         return;
     };
     let is_picked = |k: usize| shot.picks.iter().any(|p| p.corner == Some(k));
@@ -396,7 +411,7 @@ fn aside(
         {
             shot.read(scene, jobs);
         }
-        keep(ui, shot, attaching, scene, access, jobs, actions);
+        keep(ui, shot, added, scene, actions);
     });
     if let Some(why) = &shot.failure {
         ui.label(format!("⚠ Not read: {why}"));
@@ -445,10 +460,8 @@ fn stand(ui: &mut Ui, shot: &Shot, actions: &mut Actions, viewpoint: &mut Viewpo
 fn keep(
     ui: &mut Ui,
     shot: &mut Shot,
-    attaching: &mut Option<Task<Result<String, String>>>,
-    scene: &Arc<Scene>,
-    access: &Access,
-    jobs: &mut Jobs,
+    added: &mut Option<(String, Vec<PathBuf>)>,
+    scene: &Scene,
     actions: &mut Actions,
 ) {
     let photo = &shot.opened.photo;
@@ -470,7 +483,7 @@ fn keep(
             actions.ask(Action::Reload);
         }
     } else {
-        let can = can && attaching.is_none() && scene.path.exists();
+        let can = can && scene.path.exists();
         let button = ui.add_enabled(can, egui::Button::new("Add to the evidence"));
         let button = button
             .on_hover_text("Copies it and its picks beside the scene: `intrados attach`")
@@ -478,12 +491,15 @@ fn keep(
                 "Six corners first; a bundled scene has no folder to put it in: `intrados new`",
             );
         if button.clicked() && save(shot) {
-            let (path, photo) = (scene.path.clone(), shot.opened.photo.clone());
-            let access = access.clone();
-            *attaching = Some(Task::spawn(jobs, "attaching a photograph", move |job| {
-                work::attach(&path, &photo, &access, job)
-            }));
+            let photo = &shot.opened.photo;
+            let all = scene.structure.photographs.iter().filter(|p| p.member == photo.member);
+            *added = Some((photo.member.clone(), all.map(|p| p.file.clone()).collect()));
+            actions.ask(Action::Attach(Box::new(work::attachment(photo))));
         }
+    }
+    let button = ui.add_enabled(!shot.before.is_empty(), egui::Button::new("Undo pick"));
+    if button.on_hover_text("The picks as they were before the last one").clicked() {
+        shot.take_back();
     }
 }
 
@@ -557,6 +573,7 @@ fn corners(ui: &mut Ui, shot: &mut Shot, armed: &mut Option<usize>) {
         }
     });
     if let Some(k) = gone {
+        shot.remember();
         shot.picks.remove(k);
         shot.moved();
     }

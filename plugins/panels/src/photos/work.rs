@@ -1,10 +1,6 @@
 //! What takes a while: opening, placing, reading, writing. All of it runs off the frame.
 
-use std::{
-    io::Write,
-    path::{Path, PathBuf},
-    sync::Arc,
-};
+use std::{io::Write, path::PathBuf, sync::Arc};
 
 use egui::{Color32, ColorImage};
 use glam::DVec3;
@@ -20,10 +16,10 @@ use intrados_photo::{
 };
 use intrados_scene::{
     Scene,
-    attach::{Attachment, Project, What},
+    attach::{Attachment, What},
     structure::Photographed,
 };
-use intrados_stage::{Access, Job, alone, file};
+use intrados_stage::{Job, alone, file};
 use intrados_survey::photographed::{self, PhotoError};
 
 use crate::number::plus_minus;
@@ -41,6 +37,15 @@ pub(super) struct Opened {
     pub(super) outline: Outline,
     pub(super) picture: ColorImage,
     pub(super) picks: Vec<Picked>,
+}
+
+impl Opened {
+    /// Picks, with the corners of the member that they are of.
+    pub(super) fn picked(&self, picks: Vec<Pick>) -> Vec<Picked> {
+        let corner =
+            |place: DVec3| self.outline.corners.iter().position(|c| c.distance(place) < SAME);
+        picks.into_iter().map(|pick| Picked { pick, corner: corner(pick.place) }).collect()
+    }
 }
 
 /// A place that was picked.
@@ -95,14 +100,11 @@ pub(super) fn open(scene: &Scene, photo: Photographed, job: &Job) -> Result<Open
         } else {
             Vec::new()
         };
-        let picked = |pick: Pick| {
-            let corner = outline.corners.iter().position(|c| c.distance(pick.place) < SAME);
-            Picked { pick, corner }
-        };
-        let picks = picks.into_iter().map(picked).collect();
         let picture = image(Overlay::plain(&photograph));
         let (photograph, site) = (Arc::new(photograph), Arc::new(site));
-        Ok(Opened { photo, photograph, site, outline, picture, picks })
+        let none = Vec::new();
+        let opened = Opened { photo, photograph, site, outline, picture, picks: none };
+        Ok(Opened { picks: opened.picked(picks), ..opened })
     })
 }
 
@@ -238,15 +240,9 @@ pub(super) fn save(photo: &Photographed, picks: &[Picked]) -> Result<(), String>
         .map_err(|why| format!("{}: {why}", photo.picks.display()))
 }
 
-/// Puts a photograph and its picks beside the scene, as evidence; says what it is called there.
-pub(super) fn attach(
-    scene: &Path,
-    photo: &Photographed,
-    access: &Access,
-    job: &Job,
-) -> Result<String, String> {
-    let project = Project::open(scene, access).map_err(|why| why.to_string())?;
-    let what = Attachment {
+/// A photograph with its picks, as evidence.
+pub(super) fn attachment(photo: &Photographed) -> Attachment {
+    Attachment {
         member: photo.member.clone(),
         name: None,
         date: None,
@@ -260,11 +256,7 @@ pub(super) fn attach(
             files: [photo.file.clone(), photo.picks.clone()],
             focal_px: photo.focal_px,
         },
-    };
-    let proposal = project.propose(&what, job).map_err(|why| why.to_string())?;
-    let name = proposal.name.clone();
-    proposal.commit().map_err(|why| why.to_string())?;
-    Ok(name)
+    }
 }
 
 /// A photograph that is not attached yet; its picks lie beside it.

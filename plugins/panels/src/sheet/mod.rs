@@ -2,6 +2,7 @@
 //! that rests on, what is foretold, and the way to all that shows it. Of no member: the structure.
 
 mod bars;
+mod capacity;
 mod evidence;
 mod faces;
 mod links;
@@ -10,9 +11,10 @@ mod overview;
 use bevy_ecs::prelude::*;
 use egui::{RichText, Ui};
 use intrados_damage::evidence::called;
-use intrados_mechanics::plugin::Analyses;
 use intrados_predict::{MemberPrediction, Predicted};
 use intrados_scene::{Member, Scene, plugin::CurrentScene};
+
+use capacity::Mechanics;
 
 use crate::{
     Action, Actions, Latest, Selection, colours,
@@ -27,7 +29,7 @@ pub(crate) fn member(
     scene: Option<Res<CurrentScene>>,
     latest: Res<Latest>,
     selection: Res<Selection>,
-    analyses: Res<Analyses>,
+    mut mechanics: Mechanics,
     mut listing: ResMut<Listing>,
     mut actions: ResMut<Actions>,
 ) {
@@ -58,7 +60,9 @@ pub(crate) fn member(
     if let Some(told) = told {
         section(ui, "Forecast", |ui| foretold(ui, told));
     }
-    section(ui, "Capacity", |ui| capacity(ui, scene, member, told, &analyses, &mut actions));
+    section(ui, "Capacity", |ui| {
+        capacity::capacity(ui, scene, member, told, &mut mechanics, &mut actions);
+    });
     section(ui, "Photographs, slices, gauges", |ui| {
         links::links(ui, scene, member, told, &mut actions)
     });
@@ -161,7 +165,7 @@ fn ways(ui: &mut Ui, scene: &Scene, member: &Member, actions: &mut Actions) {
         let attach = ui.button("Attach evidence…");
         let hint = "Findings, CT slices, tables (A); or drop the files on the window";
         if attach.on_hover_text(hint).clicked() {
-            actions.ask(Action::Fill(Vec::new()));
+            actions.ask(Action::Fill(Vec::new(), None));
         }
     });
 }
@@ -206,46 +210,4 @@ fn foretold(ui: &mut Ui, told: &MemberPrediction) {
         "Bars begin to rust {begins}, most probably; with {:.0} % they have by now.",
         100.0 * likely
     ));
-}
-
-/// What it bears, as far as anybody has computed it, and its widest crack against its limit.
-fn capacity(
-    ui: &mut Ui,
-    scene: &Scene,
-    member: &Member,
-    told: Option<&MemberPrediction>,
-    analyses: &Analyses,
-    actions: &mut Actions,
-) {
-    if let Some(c) = told.and_then(|t| t.crack_check.as_ref()) {
-        let verdict = if c.exceeded { "⚠ wider than" } else { "✔ within" };
-        ui.label(format!(
-            "widest crack {:.2} mm ({}), {verdict} the {} mm of {}",
-            c.width_mm,
-            called(c.source),
-            c.limit_mm,
-            c.exposure
-        ));
-    }
-    let Some(assembly) = scene.structure.assembly_of(&member.id) else {
-        ui.weak("Its body is known as a surface alone: no load can be put on it.");
-        return;
-    };
-    match analyses.get(&assembly.id).map(|a| a.work.is_running()) {
-        None => {
-            ui.horizontal_wrapped(|ui| {
-                ui.weak("Its stress has not been computed.");
-                if ui.link("Go to Stress").clicked() {
-                    actions.ask(Action::Tab("Stress"));
-                }
-            });
-        }
-        Some(true) => drop(ui.weak("Its stress is being computed.")),
-        Some(false) => {
-            if ui.link("Its stress is computed: look at it").clicked() {
-                actions.ask(Action::Tab("Stress"));
-            }
-        }
-    }
-    ui.weak("Its load at failure: `intrados analyze --to-failure`.");
 }

@@ -255,7 +255,7 @@ fn run(
         .clicked()
     {
         let element = (stress.element > 0.0).then_some(stress.element);
-        begin.write(Analyze { model: model.to_owned(), meshing: Meshing { element } });
+        begin.write(Analyze { model: model.to_owned(), meshing: Meshing { element }, to_failure: false });
         (stress.moment, stress.shown, stress.picked) = (None, None, None);
     }
     let label = ui.label("Elements of");

@@ -1,13 +1,20 @@
 //! The Structure panel: all members in space, coloured by damage. A click goes to a member's sheet.
 
+mod compass;
+mod measure;
 mod model;
+mod section;
+mod spot;
 
 use bevy_ecs::prelude::*;
 use egui::{Rect, Ui, vec2};
 use glam::Vec3;
-use intrados_scene::plugin::CurrentScene;
+use intrados_scene::{Scene, plugin::CurrentScene};
+use measure::Tape;
+use section::Section;
+pub(crate) use spot::Spot;
 
-use crate::{Action, Actions, Latest, Selection};
+use crate::{Action, Actions, Latest, Selection, attach::Form};
 
 /// Where the structure is looked at from.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,19 +39,28 @@ const SIDES: [(&str, Vec3); 3] = [
 pub(crate) struct Structure {
     model: model::Model,
     /// Whether members are named in the picture.
-    pub(crate) names: bool,
+    names: bool,
+    /// Where it is cut open.
+    section: Option<Section>,
+    tape: Tape,
     wished: Option<View>,
 }
 
 impl Default for Structure {
     fn default() -> Self {
-        Self { model: model::Model::default(), names: true, wished: None }
+        let (model, tape) = (model::Model::default(), Tape::default());
+        Self { model, names: true, section: None, tape, wished: None }
     }
 }
 
 impl Structure {
     pub(crate) fn look(&mut self, view: View) {
         self.wished = Some(view);
+    }
+
+    /// The place on a member that is at a point of the window, while the picture is in sight.
+    pub(crate) fn spot(&self, at: egui::Pos2) -> Option<Spot> {
+        self.model.spot(at)
     }
 }
 
@@ -54,41 +70,112 @@ pub(crate) fn structure(
     latest: Res<Latest>,
     selection: Res<Selection>,
     mut structure: ResMut<Structure>,
+    mut form: ResMut<Form>,
     mut actions: ResMut<Actions>,
 ) {
     let Some(scene) = scene else { return };
+    let scene = &scene.0;
     let rect = ui.available_rect_before_wrap();
     let structure = structure.bypass_change_detection();
     if let Some(view) = structure.wished.take() {
         let member = if view == View::Framed { selection.0 } else { None };
-        structure.model.go(view, &scene.0, member);
+        structure.model.go(view, scene, member);
     }
-    let names = structure.names;
-    structure.model.show(ui, rect, &scene.0, &latest, *selection, names, &mut actions);
+    let section = structure.section;
+    let pointed = structure.model.show(ui, rect, scene, &latest, *selection, section);
+    let Some(pointed) = pointed else { return };
+    if structure.names {
+        structure.model.names(ui, rect, scene, &latest, *selection, &pointed.camera);
+    }
+    compass::draw(ui, rect, &pointed.camera);
+    structure.tape.draw(ui, rect, &pointed.camera);
+    point(structure, scene, &latest, pointed, form.bypass_change_detection(), &mut actions);
     let bar = Rect::from_min_size(rect.min + vec2(8.0, 8.0), vec2(rect.width() - 16.0, 24.0));
     ui.scope_builder(egui::UiBuilder::new().max_rect(bar), |ui| {
-        ui.horizontal(|ui| tools(ui, structure, *selection, &mut actions));
+        ui.vertical(|ui| tools(ui, structure, *selection, &mut actions));
     });
 }
 
-/// Where to look from, and whether names are shown.
-fn tools(ui: &mut Ui, structure: &mut Structure, selection: Selection, actions: &mut Actions) {
-    egui::Frame::popup(ui.style()).inner_margin(4).show(ui, |ui| {
-        let all = ui.button("All").on_hover_text("The whole structure (Home)");
-        if all.clicked() {
-            actions.ask(Action::Home);
-        }
-        let hint = "The selected member fills the picture (F)";
-        let member = ui.add_enabled(selection.0.is_some(), egui::Button::new("Selected"));
-        if member.on_hover_text(hint).clicked() {
-            actions.ask(Action::Frame);
-        }
-        for (name, axis) in SIDES {
-            if ui.button(name).clicked() {
-                structure.look(View::Along(axis));
+/// What a click does: it selects a member, or says where on it evidence is, or holds the tape.
+fn point(
+    structure: &mut Structure,
+    scene: &Scene,
+    latest: &Latest,
+    pointed: model::Pointed,
+    form: &mut Form,
+    actions: &mut Actions,
+) {
+    let model::Pointed { response, under, .. } = pointed;
+    if response.clicked() {
+        if structure.tape.is_on {
+            under.iter().for_each(|spot| structure.tape.put(spot.at));
+        } else {
+            actions.ask(Action::Select(under.map(|spot| spot.member)));
+            if let Some((spot, member)) =
+                under.and_then(|s| Some((s, scene.members.get(s.member)?)))
+                && form.is_open
+            {
+                form.put_at(spot.along(member.frame), spot.face(member));
             }
         }
-        ui.toggle_value(&mut structure.names, "Names")
-            .on_hover_text("Name and damage of every member, the worst first");
+    }
+    if response.double_clicked() && !structure.tape.is_on {
+        actions.ask(Action::Frame);
+    }
+    if let Some(spot) = under {
+        response.on_hover_ui_at_pointer(|ui| model::said(ui, scene, latest, &spot));
+    }
+}
+
+/// Where to look from, what is shown, and the tools that are out.
+fn tools(ui: &mut Ui, structure: &mut Structure, selection: Selection, actions: &mut Actions) {
+    let frame = egui::Frame::popup(ui.style()).inner_margin(4);
+    frame.show(ui, |ui| {
+        ui.horizontal(|ui| {
+            views(ui, structure, selection, actions);
+            ui.toggle_value(&mut structure.names, "Names")
+                .on_hover_text("Name and damage of every member, the worst first");
+            let mut is_cut = structure.section.is_some();
+            let hint = "Cuts it open, through the middle of the selected member";
+            if ui.toggle_value(&mut is_cut, "Section").on_hover_text(hint).changed() {
+                structure.section = is_cut.then(|| structure.model.section(selection.0));
+            }
+            let hint = "The distance between two places that are clicked";
+            let tape = ui.toggle_value(&mut structure.tape.is_on, "Measure");
+            if tape.on_hover_text(hint).changed() {
+                structure.tape.clear();
+            }
+        });
     });
+    let bounds = structure.model.bounds();
+    if let Some(section) = &mut structure.section {
+        frame.show(ui, |ui| ui.horizontal(|ui| section.tools(ui, bounds)));
+    }
+    if structure.tape.is_on {
+        frame.show(ui, |ui| {
+            ui.horizontal(|ui| {
+                ui.label(structure.tape.said());
+                if ui.button("Clear the tape").clicked() {
+                    structure.tape.clear();
+                }
+            })
+        });
+    }
+}
+
+fn views(ui: &mut Ui, structure: &mut Structure, selection: Selection, actions: &mut Actions) {
+    let all = ui.button("All").on_hover_text("The whole structure (Home)");
+    if all.clicked() {
+        actions.ask(Action::Home);
+    }
+    let hint = "The selected member fills the picture (F)";
+    let member = ui.add_enabled(selection.0.is_some(), egui::Button::new("Selected"));
+    if member.on_hover_text(hint).clicked() {
+        actions.ask(Action::Frame);
+    }
+    for (name, axis) in SIDES {
+        if ui.button(name).clicked() {
+            structure.look(View::Along(axis));
+        }
+    }
 }

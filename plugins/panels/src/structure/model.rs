@@ -12,8 +12,9 @@ use intrados_report::surface::{Facet, facets};
 use intrados_scene::{Camera, Scene};
 use rayon::prelude::*;
 
+use super::{section::Section, spot::Spot};
 use crate::{
-    Action, Actions, Latest, Selection, colours,
+    Latest, Selection, colours,
     number::plus_minus,
     surface::{Drawn, Surface, bounds, draw, hand, place},
 };
@@ -28,6 +29,8 @@ const DARKER: f32 = 0.72;
 const EDGE: f32 = 0.86;
 /// Share of its brightness that a pixel on an edge keeps.
 const INK: f32 = 0.62;
+/// Pixels from one line of hatching to the next.
+const HATCH: usize = 9;
 /// Most names of members in the picture.
 const MOST_NAMES: usize = 40;
 
@@ -47,6 +50,9 @@ pub(super) struct Model {
 
 struct Shown {
     key: Key,
+    /// What is drawn: the structure, or what a section has left of it.
+    facets: Arc<Vec<Facet>>,
+    rect: Rect,
     drawn: Drawn,
     texture: TextureHandle,
 }
@@ -59,10 +65,20 @@ struct Key {
     camera: Camera,
     size: [usize; 2],
     over: usize,
+    section: Option<Section>,
+}
+
+/// What the pointer does in the picture.
+pub(super) struct Pointed {
+    pub(super) response: egui::Response,
+    /// What is under it.
+    pub(super) under: Option<Spot>,
+    /// Where it is looked from.
+    pub(super) camera: Camera,
 }
 
 impl Model {
-    /// Draws it into `rect`; gives what was drawn, for whoever saves it.
+    /// Draws it into `rect`; none: there is nothing to be seen.
     pub(super) fn show(
         &mut self,
         ui: &mut Ui,
@@ -70,9 +86,8 @@ impl Model {
         scene: &Arc<Scene>,
         latest: &Latest,
         selection: Selection,
-        names: bool,
-        actions: &mut Actions,
-    ) {
+        section: Option<Section>,
+    ) -> Option<Pointed> {
         self.adopt(scene);
         ui.painter().rect_filled(rect, 0.0, ground(ui));
         if self.facets.is_empty() {
@@ -80,7 +95,7 @@ impl Model {
             let text = "No member of this scene has a surface.";
             let ink = ui.visuals().weak_text_color();
             ui.painter().text(rect.center(), Align2::CENTER_CENTER, text, font, ink);
-            return;
+            return None;
         }
         let (width, height) = (rect.width().max(8.0) as u32, rect.height().max(8.0) as u32);
         let response = ui.allocate_rect(rect, Sense::click_and_drag());
@@ -95,28 +110,24 @@ impl Model {
         let camera = hand(ui, &response, rect, camera);
         let is_moving = response.dragged() || camera != before;
         self.camera = Some(camera.clone());
-        self.redraw(ui, rect, latest, selection, camera.clone(), is_moving);
-        let Some(shown) = &self.shown else { return };
+        self.redraw(ui, rect, latest, selection, camera.clone(), section, is_moving);
+        let shown = self.shown.as_ref()?;
         let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
         ui.painter().image(shown.texture.id(), rect, whole, Color32::WHITE);
-        if names {
-            self.names(ui, rect, scene, latest, selection, &camera);
-        }
         legend(ui, rect);
         scale(ui, rect, &camera);
-        let under = response.hover_pos().and_then(|at| {
-            let share = (at - rect.min) / rect.size();
-            self.facets.get(shown.drawn.face(share.x, share.y)? as usize).copied()
-        });
-        if response.clicked() {
-            actions.ask(Action::Select(under.map(|f| f.member)));
-        }
-        if response.double_clicked() {
-            actions.ask(Action::Frame);
-        }
-        if let Some(facet) = under {
-            response.on_hover_ui_at_pointer(|ui| said(ui, scene, latest, facet));
-        }
+        let under = response.hover_pos().and_then(|at| shown.spot(at));
+        Some(Pointed { response, under, camera })
+    }
+
+    /// The place on a member that is at a point of the window.
+    pub(super) fn spot(&self, at: egui::Pos2) -> Option<Spot> {
+        self.shown.as_ref()?.spot(at)
+    }
+
+    /// Corners of the box around the structure.
+    pub(super) fn bounds(&self) -> [Vec3; 2] {
+        bounds(&self.positions)
     }
 
     /// Takes the surfaces of another scene; the camera stays where it was in one that is like it.
@@ -153,7 +164,7 @@ impl Model {
     }
 
     /// What members are called and how they fare, the worst first where names would overlap.
-    fn names(
+    pub(super) fn names(
         &self,
         ui: &Ui,
         rect: Rect,
@@ -199,11 +210,24 @@ impl Model {
         }
     }
 
+    /// The middle of what is drawn of a member; none: a section has taken it away.
     fn middle(&self, member: usize) -> Option<Vec3> {
-        let own = self.facets.iter().filter(|f| f.member == member);
+        let [low, high] = Self::bounds_of(member, &self.shown.as_ref()?.facets)?;
+        Some(0.5 * (low + high))
+    }
+
+    fn bounds_of(member: usize, facets: &[Facet]) -> Option<[Vec3; 2]> {
+        let own = facets.iter().filter(|f| f.member == member);
         let points: Vec<Vec3> = own.flat_map(|f| f.corners).collect();
-        let [low, high] = bounds(&points);
-        (!points.is_empty()).then(|| 0.5 * (low + high))
+        (!points.is_empty()).then(|| bounds(&points))
+    }
+
+    /// A section through the middle of a member, or of the structure.
+    pub(super) fn section(&self, member: Option<usize>) -> Section {
+        let whole = self.bounds();
+        let own = member.and_then(|m| Self::bounds_of(m, &self.facets));
+        let [low, high] = own.unwrap_or(whole);
+        Section::through(0.5 * (low + high), whole)
     }
 
     fn redraw(
@@ -213,6 +237,7 @@ impl Model {
         latest: &Latest,
         selection: Selection,
         camera: Camera,
+        section: Option<Section>,
         held: bool,
     ) {
         let members = self.facets.iter().map(|f| f.member + 1).max().unwrap_or(0);
@@ -234,28 +259,34 @@ impl Model {
             camera,
             size,
             over: if held { 1 } else { 2 },
+            section,
         };
         if self.shown.as_ref().is_some_and(|s| s.key == key) {
             return;
         }
+        let cut = section.map(|s| Arc::new(s.cut(&self.facets, bounds(&self.positions))));
+        let facets = cut.unwrap_or_else(|| Arc::clone(&self.facets));
         let value = |f: &Facet| {
             let damage = key.damage[f.member][f.zone].map_or(f32::NAN, |d| d as f32);
             let damage = if key.forecast[f.member][f.zone] { damage + FORECAST } else { damage };
             if selection.0.is_some_and(|s| s != f.member) { damage + ASIDE } else { damage }
         };
-        let values: Vec<f32> = self.facets.iter().flat_map(|f| [value(f); 3]).collect();
-        let faces: Vec<[u32; 4]> = (0..self.facets.len() as u32)
-            .map(|i| [3 * i, 3 * i + 1, 3 * i + 2, 3 * i + 2])
-            .collect();
+        let values: Vec<f32> = facets.iter().flat_map(|f| [value(f); 3]).collect();
+        let positions: Vec<Vec3> = facets.iter().flat_map(|f| f.corners).collect();
+        let faces: Vec<[u32; 4]> =
+            (0..facets.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2, 3 * i + 2]).collect();
         let surface = Surface {
-            positions: &self.positions,
+            positions: &positions,
             values: &values,
             faces: &faces,
             mesh: false,
             sun: Some(sun(&key.camera)),
         };
         let mut drawn = draw(&key.camera, key.size, key.over, &surface, colour);
-        ink(&mut drawn, &self.facets, selection);
+        if section.is_some() {
+            hatch(&mut drawn, &facets, &key.camera);
+        }
+        ink(&mut drawn, &facets, selection);
         let texture = match self.shown.take() {
             Some(mut before) => {
                 before.texture.set(drawn.image.clone(), TextureOptions::LINEAR);
@@ -263,7 +294,34 @@ impl Model {
             }
             None => ui.ctx().load_texture("damage", drawn.image.clone(), TextureOptions::LINEAR),
         };
-        self.shown = Some(Shown { key, drawn, texture });
+        self.shown = Some(Shown { key, facets, rect, drawn, texture });
+    }
+}
+
+impl Shown {
+    fn spot(&self, at: egui::Pos2) -> Option<Spot> {
+        let share = (at - self.rect.min) / self.rect.size();
+        let facet = self.facets.get(self.drawn.face(share.x, share.y)? as usize)?;
+        Spot::seen(&self.key.camera, share, facet)
+    }
+}
+
+/// Hatches what a section has opened: where the nearest face turns its back, one looks into its
+/// member, and the cut lies before it.
+fn hatch(drawn: &mut Drawn, facets: &[Facet], camera: &Camera) {
+    let turns_away = |f: &Facet| {
+        let [a, b, c] = f.corners;
+        (b - a).cross(c - a).dot(camera.position - a) < 0.0
+    };
+    let inside: Vec<bool> = facets.iter().map(turns_away).collect();
+    let w = drawn.size[0];
+    let open: Vec<usize> = (0..drawn.faces().len())
+        .into_par_iter()
+        .filter(|at| inside.get(drawn.faces()[*at] as usize) == Some(&true))
+        .collect();
+    for at in open {
+        let is_line = (at % w + at / w) % HATCH < 2;
+        drawn.image.pixels[at] = Color32::from_gray(if is_line { 70 } else { 150 });
     }
 }
 
@@ -360,16 +418,16 @@ fn colour(value: f32) -> [u8; 3] {
     colours::damage(value, is_forecast).map(|c| (f32::from(c) * dim) as u8)
 }
 
-fn said(ui: &mut Ui, scene: &Scene, latest: &Latest, facet: Facet) {
-    let Some(member) = scene.members.get(facet.member) else { return };
+pub(super) fn said(ui: &mut Ui, scene: &Scene, latest: &Latest, spot: &Spot) {
+    let Some(member) = scene.members.get(spot.member) else { return };
     ui.strong(&member.name);
-    let zone = latest.member(facet.member).and_then(|p| p.zones.0[facet.zone]);
+    let zone = latest.member(spot.member).and_then(|p| p.zones.0[spot.zone]);
     match zone {
         Some(r) => {
-            let basis = latest.member(facet.member).map_or("", |p| p.basis[facet.zone].name());
+            let basis = latest.member(spot.member).map_or("", |p| p.basis[spot.zone].name());
             ui.label(format!(
                 "{} of the axis: d = {}, {basis}",
-                place_of(facet.zone),
+                place_of(spot.zone),
                 plus_minus(r.value, r.std_error, "")
             ))
         }

@@ -1,5 +1,8 @@
 //! What the window does, without a screen: clicks go through the accessibility tree.
 
+mod journey;
+mod tools;
+
 use std::{cell::RefCell, path::Path, rc::Rc, time::Duration};
 
 use bevy_app::App;
@@ -848,8 +851,13 @@ fn stress_of(window: &mut Window, index: usize, element: f64) {
     window.click("Stress");
     assert!(window.harness.query_by_label("Not analysed yet").is_some());
     let model = window.with(|w| w.resource::<CurrentScene>().0.members[index].id.clone());
-    window
-        .with(|w| w.write_message(Analyze { model, meshing: Meshing { element: Some(element) } }));
+    window.with(|w| {
+        w.write_message(Analyze {
+            model,
+            meshing: Meshing { element: Some(element) },
+            to_failure: false,
+        })
+    });
 }
 
 #[test]
@@ -1176,6 +1184,27 @@ fn a_photograph_is_placed_by_its_corners_and_becomes_evidence() {
         let to = egui::vec2((scale * (u - 200.0)) as f32, (scale * (v - 200.0)) as f32);
         press(&mut window, rect.center() + to);
     }
+    // A pick that was wrong is taken back, and made again.
+    let is_placed =
+        |window: &Window| window.harness.query_by_label_contains("Taken from").is_some();
+    for wanted in [true, false] {
+        for _ in 0..PATIENCE {
+            if is_placed(&window) == wanted {
+                break;
+            }
+            window.frame();
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        assert_eq!(is_placed(&window), wanted);
+        if wanted {
+            window.click("Undo pick");
+        }
+    }
+    let last = corners.iter().enumerate().rfind(|(_, p)| seen(p)).expect("a corner");
+    window.click(&format!("Corner {}", last.0 + 1));
+    let [u, v] = pose.project(*last.1).unwrap();
+    let to = egui::vec2((scale * (u - 200.0)) as f32, (scale * (v - 200.0)) as f32);
+    press(&mut window, rect.center() + to);
     for _ in 0..2000 {
         if window.harness.query_by_label_contains("Taken from").is_some() {
             break;
@@ -1195,6 +1224,14 @@ fn a_photograph_is_placed_by_its_corners_and_becomes_evidence() {
     let photo = window.with(|w| w.resource::<CurrentScene>().0.structure.photographs[0].clone());
     assert!(photo.file.starts_with(folder.path()) && photo.member == "P");
     assert_eq!(std::fs::read_to_string(&photo.picks).unwrap().lines().count(), 7);
+    // The copy is looked at now; and what was added is taken back as any evidence is.
+    assert_eq!(window.with(|w| *w.resource::<Selection>()), Selection(Some(0)));
+    window.until_seen("Save picks");
+    window.harness.key_press_modifiers(egui::Modifiers::COMMAND, Key::Z);
+    window.until("the scene without it", |w| {
+        w.resource::<CurrentScene>().0.structure.photographs.is_empty()
+    });
+    assert!(!photo.file.exists());
 }
 
 /// A file as the system hands it over that is let go over the window.

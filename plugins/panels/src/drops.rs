@@ -1,0 +1,118 @@
+//! What is let go over the window.
+
+use std::{
+    path::{Path, PathBuf},
+    time::{Duration, Instant},
+};
+
+use bevy_ecs::prelude::*;
+use egui::Ui;
+use intrados_scene::{attach::What, plugin::CurrentScene};
+
+use crate::{
+    Action, Actions, Selection,
+    attach::{self, Form},
+    dialog,
+    structure::{Spot, Structure},
+    workspace::Desk,
+};
+
+/// So long it is waited for the pointer: systems say where files were let go only once it moves
+/// again.
+const PATIENCE: Duration = Duration::from_millis(400);
+
+/// What was let go and waits for its place.
+#[derive(Resource, Default)]
+pub(crate) struct Drops(Option<(Vec<PathBuf>, Instant)>);
+
+/// Takes what was let go: evidence belongs to the member under the pointer, or else to the selected
+/// one, a photograph is placed first, a model is opened.
+pub(crate) fn take(ui: &Ui, world: &mut World) {
+    let dropped: Vec<PathBuf> =
+        ui.input(|i| i.raw.dropped_files.iter().map(|f| f.path().to_owned()).collect());
+    let mut drops = world.resource_mut::<Drops>();
+    if !dropped.is_empty() {
+        drops.0 = Some((dropped, Instant::now()));
+    }
+    let Some((files, since)) = drops.0.take() else { return };
+    let at = ui.input(|i| i.pointer.latest_pos());
+    if at.is_none() && since.elapsed() < PATIENCE {
+        drops.0 = Some((files, since));
+        ui.ctx().request_repaint_after(Duration::from_millis(30));
+        return;
+    }
+    let spot = at.and_then(|at| under(world, at));
+    for action in meant(world, &files, spot) {
+        world.resource_mut::<Actions>().ask(action);
+    }
+}
+
+/// The place on a member that is at a point of the window.
+fn under(world: &World, at: egui::Pos2) -> Option<Spot> {
+    let rect = world.resource::<Desk>().place("Structure")?;
+    world.resource::<Structure>().spot(at).filter(|_| rect.contains(at))
+}
+
+/// What whoever let these files go there wants.
+fn meant(world: &mut World, files: &[PathBuf], spot: Option<Spot>) -> Vec<Action> {
+    let Some(last) = files.last() else { return Vec::new() };
+    let scene = world.get_resource::<CurrentScene>().map(|s| s.0.clone());
+    let Some(scene) = scene else { return vec![Action::Open(last.clone())] };
+    let evidence: Option<Vec<Vec<PathBuf>>> = files.iter().map(|p| attach::evidence(p)).collect();
+    let mut form = world.resource_mut::<Form>();
+    if let (true, Some(evidence)) = (form.is_open, &evidence) {
+        form.add(evidence.concat());
+        return Vec::new();
+    }
+    let there = spot.and_then(|spot| Some((spot, scene.members.get(spot.member)?)));
+    let has_member = there.is_some() || world.resource::<Selection>().0.is_some();
+    let select = there.map(|(spot, _)| Action::Select(Some(spot.member)));
+    let is_table = What::is_table(last) == Some(true);
+    let then = match evidence {
+        Some(files) if has_member || is_table => {
+            let place = there.map(|(spot, member)| (spot.along(member.frame), spot.face(member)));
+            Action::Fill(files.concat(), place)
+        }
+        _ if dialog::is_photograph(last) => Action::Photograph(last.clone()),
+        _ => return vec![Action::Open(last.clone())],
+    };
+    select.into_iter().chain([then]).collect()
+}
+
+/// While files hang over the window: what is under them stays in sight.
+pub(crate) fn hint(ui: &Ui, world: &World) {
+    let hovered: Vec<PathBuf> =
+        ui.input(|i| i.raw.hovered_files.iter().filter_map(|f| f.path.clone()).collect());
+    if ui.input(|i| i.raw.hovered_files.is_empty()) {
+        return;
+    }
+    let is_open = world.contains_resource::<CurrentScene>();
+    let is_evidence = |path: &PathBuf| {
+        !is_model(path) && (attach::evidence(path).is_some() || dialog::is_photograph(path))
+    };
+    let text = if is_open && (hovered.is_empty() || hovered.iter().all(is_evidence)) {
+        "Drop it on the member that it is of"
+    } else {
+        "Drop to open"
+    };
+    let rect = ui.ctx().content_rect();
+    let layer = egui::LayerId::new(egui::Order::Foreground, egui::Id::unique("drop here"));
+    let painter = ui.ctx().layer_painter(layer);
+    let ink = egui::Color32::WHITE;
+    let galley = painter.layout_no_wrap(text.into(), egui::FontId::proportional(26.0), ink);
+    let size = galley.size() + egui::vec2(40.0, 20.0);
+    let back = egui::Rect::from_center_size(rect.center_top() + egui::vec2(0.0, 90.0), size);
+    painter.rect_filled(back, 8.0, egui::Color32::from_black_alpha(215));
+    painter.galley(back.min + egui::vec2(20.0, 10.0), galley, ink);
+    painter.rect_stroke(
+        rect.shrink(3.0),
+        6.0,
+        (3.0, crate::colours::SELECTED),
+        egui::StrokeKind::Inside,
+    );
+}
+
+fn is_model(path: &Path) -> bool {
+    let ending = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    ["ron", "glb", "gltf", "ifc"].contains(&ending.as_str())
+}

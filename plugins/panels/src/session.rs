@@ -1,0 +1,242 @@
+//! What is open and saved nowhere, kept in a file for the case that the program breaks off.
+
+use std::{
+    fs::{self, File, TryLockError},
+    io::Write,
+    path::{Path, PathBuf},
+    time::{Duration, Instant},
+};
+
+use bevy_ecs::prelude::*;
+use egui::{Panel as Side, Ui};
+use glam::DVec3;
+use intrados_photo::Pick;
+use intrados_scene::{
+    Scene,
+    plugin::{CurrentScene, SceneChanged},
+};
+use intrados_stage::file;
+use serde::{Deserialize, Serialize};
+
+use crate::{Action, Actions, Selection, attach::Form, photos::Photos, workspace::Desk};
+
+/// Schema of the file.
+const SCHEMA: &str = "intrados.session/1";
+/// A larger file is none of ours.
+const LARGEST: u64 = 1 << 20;
+/// It is written at most so often.
+const EVERY: Duration = Duration::from_millis(500);
+
+/// What is kept.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+struct Kept {
+    schema: String,
+    scene: PathBuf,
+    /// Id of the member that is selected.
+    member: Option<String>,
+    /// The form of evidence, where it is open.
+    form: Option<Form>,
+    photograph: Option<KeptPhotograph>,
+}
+
+/// A photograph, and picks that are not saved yet: pixel and place.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+struct KeptPhotograph {
+    file: PathBuf,
+    picks: Vec<([f64; 2], [f64; 3])>,
+}
+
+/// The session of now, and what another has left behind.
+#[derive(Resource, Default)]
+pub(crate) struct Session {
+    /// Where it is kept; none: nowhere, or another window keeps its own there.
+    file: Option<PathBuf>,
+    /// Held as long as this window is open. The system lets go of it however the program ends.
+    lock: Option<File>,
+    /// What a session that broke off has left, until somebody wants it or not.
+    left: Option<Kept>,
+    /// What is being opened again.
+    coming: Option<Kept>,
+    written: Option<Kept>,
+    last: Option<Instant>,
+}
+
+impl Session {
+    /// What was left, if a session was not ended.
+    pub(crate) fn read(file: Option<PathBuf>) -> Self {
+        let Some(file) = file else { return Self::default() };
+        let lock = match locked(&file.with_extension("lock")) {
+            Ok(lock) => lock,
+            Err(why) => {
+                tracing::debug!("the session is not kept in {}: {why}", file.display());
+                return Self::default();
+            }
+        };
+        let is_ours = file.metadata().is_ok_and(|m| m.len() < LARGEST);
+        let text = is_ours.then(|| fs::read_to_string(&file).ok()).flatten();
+        let left = text.and_then(|t| serde_json::from_str::<Kept>(&t).ok());
+        let left = left.filter(|kept| kept.schema == SCHEMA);
+        let mut session = Self::default();
+        (session.file, session.lock, session.left) = (Some(file), Some(lock), left);
+        session
+    }
+
+    /// Keeps what is open now, where that is another thing than before.
+    fn keep(&mut self, now: Kept) {
+        let is_soon = self.last.is_some_and(|last| last.elapsed() < EVERY);
+        let Some(file) = self.file.as_ref().filter(|_| !is_soon) else { return };
+        if self.written.as_ref() == Some(&now) || self.left.is_some() || self.coming.is_some() {
+            return;
+        }
+        self.last = Some(Instant::now());
+        if let Err(error) = write(file, &now) {
+            tracing::warn!("the session was not written to {}: {error}", file.display());
+        }
+        self.written = Some(now);
+    }
+}
+
+/// A session that ends leaves nothing behind, unless it is a panic that ends it, or nobody has looked
+/// yet at what another has left.
+impl Drop for Session {
+    fn drop(&mut self) {
+        if !std::thread::panicking()
+            && let Some(file) =
+                self.file.as_ref().filter(|_| self.left.is_none() && self.lock.is_some())
+            && file.exists()
+            && let Err(error) = fs::remove_file(file)
+        {
+            tracing::warn!("{} was not removed: {error}", file.display());
+        }
+    }
+}
+
+fn locked(path: &Path) -> std::io::Result<File> {
+    fs::create_dir_all(path.parent().unwrap_or(Path::new(".")))?;
+    let file = File::options().create(true).write(true).truncate(false).open(path)?;
+    match file.try_lock() {
+        Ok(()) => Ok(file),
+        Err(TryLockError::WouldBlock) => Err(std::io::Error::other("another window is open")),
+        Err(TryLockError::Error(error)) => Err(error),
+    }
+}
+
+fn write(path: &Path, kept: &Kept) -> std::io::Result<()> {
+    let text = serde_json::to_string_pretty(kept)?;
+    file::put(path, |out| out.write_all(text.as_bytes()))
+}
+
+/// Keeps what is open, and goes on with what was left once its scene is there.
+pub(crate) fn keep(
+    scene: Option<Res<CurrentScene>>,
+    mut changed: MessageReader<SceneChanged>,
+    mut session: ResMut<Session>,
+    mut selection: ResMut<Selection>,
+    mut form: ResMut<Form>,
+    mut photos: ResMut<Photos>,
+    mut desk: ResMut<Desk>,
+) {
+    let is_new = changed.read().last().is_some();
+    let Some(scene) = scene else { return };
+    let session = session.bypass_change_detection();
+    if is_new && let Some(kept) = session.coming.take_if(|kept| kept.scene == scene.0.path) {
+        let member = kept.member.as_ref();
+        let index = member.and_then(|id| scene.0.members.iter().position(|m| m.id == *id));
+        selection.set_if_neq(Selection(index));
+        if let Some(left) = kept.form {
+            *form = left;
+        }
+        if let Some(left) = kept.photograph {
+            let pick = |(pixel, place): ([f64; 2], [f64; 3])| Pick { pixel, place: place.into() };
+            photos.go_on(left.file, left.picks.into_iter().map(pick).collect());
+            desk.open("Photos");
+        }
+        return;
+    }
+    if scene.0.path.exists() {
+        session.keep(of(&scene.0, *selection, &form, &photos));
+    }
+}
+
+/// What is open now.
+fn of(scene: &Scene, selection: Selection, form: &Form, photos: &Photos) -> Kept {
+    let picks =
+        |picks: Vec<Pick>| picks.iter().map(|p| (p.pixel, DVec3::to_array(&p.place))).collect();
+    Kept {
+        schema: SCHEMA.into(),
+        // Relative paths mean something else tomorrow.
+        scene: std::path::absolute(&scene.path).unwrap_or_else(|_| scene.path.clone()),
+        member: selection.0.and_then(|i| scene.members.get(i)).map(|m| m.id.clone()),
+        form: form.is_open.then(|| form.clone()),
+        photograph: photos.unsaved().map(|(file, all)| KeptPhotograph { file, picks: picks(all) }),
+    }
+}
+
+/// Offers what a session has left that was not ended.
+pub(crate) fn offer(ui: &mut Ui, world: &mut World) {
+    let Some(left) = world.resource::<Session>().left.clone() else { return };
+    Side::top("session").show(ui, |ui| {
+        ui.horizontal_wrapped(|ui| {
+            ui.label(format!("The last session was not ended: {}.", left.scene.display()));
+            if left.form.is_some() || left.photograph.is_some() {
+                ui.label("What was filled in there and not saved is kept.");
+            }
+            let session = &mut *world.resource_mut::<Session>();
+            if ui.button("Go on with it").clicked() {
+                session.coming = session.left.take();
+                world.resource_mut::<Actions>().ask(Action::Open(left.scene));
+            } else if ui.button("Forget it").clicked() {
+                session.left = None;
+            }
+        });
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn kept(scene: &str) -> Kept {
+        let mut form = Form::default();
+        form.begin("C1", Vec::new());
+        form.put_at(0.25, None);
+        Kept {
+            schema: SCHEMA.into(),
+            scene: scene.into(),
+            member: Some("C1".into()),
+            form: Some(form),
+            photograph: Some(KeptPhotograph {
+                file: "a.jpg".into(),
+                picks: vec![([1.5, 2.0], [0.1, 0.2, 0.3])],
+            }),
+        }
+    }
+
+    #[test]
+    fn what_broke_off_is_offered_and_what_was_ended_is_not() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("deep/session.json");
+        let mut session = Session::read(Some(file.clone()));
+        assert!(session.left.is_none());
+        session.keep(kept("/a/scene.ron"));
+        // Two windows at once: the second keeps nothing, and offers nothing.
+        let second = Session::read(Some(file.clone()));
+        assert!(second.file.is_none() && second.left.is_none());
+        drop(second);
+        assert!(file.exists());
+        // A crash: nothing is tidied up, but the system lets go of the lock.
+        session.file = None;
+        drop(session);
+        let again = Session::read(Some(file.clone()));
+        assert_eq!(again.left, Some(kept("/a/scene.ron")));
+        // Nobody has answered: it is offered once more.
+        drop(again);
+        let mut again = Session::read(Some(file.clone()));
+        assert!(again.left.take().is_some());
+        again.keep(kept("/b/scene.ron"));
+        drop(again);
+        assert!(!file.exists());
+        fs::write(&file, "[{").unwrap();
+        assert!(Session::read(Some(file)).left.is_none());
+    }
+}

@@ -1,0 +1,95 @@
+//! The distance between two places that were clicked.
+
+use egui::{Align2, Color32, Rect, Ui, vec2};
+use glam::Vec3;
+use intrados_scene::Camera;
+
+use crate::{colours, surface::place};
+
+/// The tape, and the places that it lies between.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(super) struct Tape {
+    pub(super) is_on: bool,
+    ends: Vec<Vec3>,
+}
+
+impl Tape {
+    /// Puts an end down; of a tape that has both, a new first one.
+    pub(super) fn put(&mut self, at: Vec3) {
+        if self.ends.len() >= 2 {
+            self.ends.clear();
+        }
+        self.ends.push(at);
+    }
+
+    pub(super) fn clear(&mut self) {
+        self.ends.clear();
+    }
+
+    /// What it reads, or what to do.
+    pub(super) fn said(&self) -> String {
+        match self.ends[..] {
+            [a, b, ..] => reading(a, b),
+            [_] => "and to where? Click the other place.".into(),
+            [] => "Click the first place on a member.".into(),
+        }
+    }
+
+    pub(super) fn draw(&self, ui: &Ui, rect: Rect, camera: &Camera) {
+        let painter = ui.painter().with_clip_rect(rect);
+        let forward = camera.target - camera.position;
+        let is_before = |p: &&Vec3| (**p - camera.position).dot(forward) > 0.0;
+        let seen: Vec<egui::Pos2> =
+            self.ends.iter().filter(is_before).map(|p| place(camera, rect, *p)).collect();
+        if let ([from, to], [a, b]) = (&seen[..], &self.ends[..]) {
+            painter.line_segment([*from, *to], (4.0, Color32::from_black_alpha(150)));
+            painter.line_segment([*from, *to], (2.0, colours::SELECTED));
+            let length = length((*b - *a).length());
+            let font = egui::TextStyle::Body.resolve(ui.style());
+            let galley = painter.layout_no_wrap(length, font, Color32::WHITE);
+            let middle = from.lerp(*to, 0.5);
+            let back = Align2::CENTER_BOTTOM.anchor_size(middle, galley.size() + vec2(8.0, 4.0));
+            painter.rect_filled(back, 3.0, Color32::from_black_alpha(190));
+            painter.galley(back.min + vec2(4.0, 2.0), galley, Color32::WHITE);
+        }
+        for end in seen {
+            painter.circle(end, 4.0, colours::SELECTED, (1.0, Color32::BLACK));
+        }
+    }
+}
+
+/// A distance, and how far it goes sideways and up.
+fn reading(a: Vec3, b: Vec3) -> String {
+    let d = b - a;
+    let level = vec2(d.x, d.z).length();
+    format!("{} ({} level, {} upright)", length(d.length()), length(level), length(d.y.abs()))
+}
+
+/// m, as it is read on a drawing: millimetres, from 10 m on centimetres.
+fn length(m: f32) -> String {
+    if m < 1.0 {
+        format!("{:.0} mm", 1e3 * m)
+    } else if m < 10.0 {
+        format!("{m:.3} m")
+    } else {
+        format!("{m:.2} m")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tape_reads_the_distance_with_its_unit() {
+        let mut tape = Tape::default();
+        tape.put(Vec3::new(1.0, 0.0, 0.0));
+        assert!(tape.said().starts_with("and to where?"));
+        tape.put(Vec3::new(1.0, 4.0, 3.0));
+        assert_eq!(tape.said(), "5.000 m (3.000 m level, 4.000 m upright)");
+        tape.put(Vec3::ZERO);
+        tape.put(Vec3::new(0.25, 0.0, 0.0));
+        assert_eq!(tape.said(), "250 mm (250 mm level, 0 mm upright)");
+        assert_eq!(length(12.345), "12.35 m");
+    }
+}
