@@ -49,6 +49,9 @@ pub(super) fn capacity(
             c.exposure
         ));
     }
+    if let Some(c) = told.and_then(|t| t.capacity.as_ref()) {
+        ui.label(format!("It {}.", c.told())).on_hover_text(c.because.as_str());
+    }
     let Some(assembly) = scene.structure.assembly_of(&member.id) else {
         ui.weak("Its body is known as a surface alone: no load can be put on it.");
         return;
