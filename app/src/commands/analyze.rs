@@ -10,6 +10,7 @@ use intrados_mechanics::{
     analysis::{GaugeOutcome, MemberOutcome, Moment, Outcome as Life, Pictures, analyze},
     deck::Case,
     frame::Whole,
+    linear::concerns,
     material::law::Cracks,
     member::{Along, MemberError, Meshing, Prepared, prepare_within},
     mesh::voxel::VoxelError,
@@ -25,7 +26,7 @@ use intrados_stage::{
 };
 use serde::Serialize;
 
-use super::{walks, whole};
+use super::{linear, walks, whole};
 use crate::{
     args::{self, CrackLaw, Regularise},
     failure::{Failure, Outcome},
@@ -77,7 +78,10 @@ pub(crate) fn run(session: &Session, args: &args::Analyze) -> Result<Outcome, Fa
         return as_one(session, args);
     }
     let mut work = match extension(&args.scene).as_deref() {
-        Some(kind @ ("inp" | "msh")) => deck(args, kind)?,
+        Some(kind @ ("inp" | "msh")) => match deck(args, kind)? {
+            Read::Members(work) => work,
+            Read::Linear(deck) => return linear::run(session, args, &deck),
+        },
         _ => scene(session, args)?,
     };
     if args.regularise == Regularise::Gradient {
@@ -331,8 +335,16 @@ fn whole_of(session: &Session, scene: &Scene, asked: bool) -> Result<Option<Whol
     }
 }
 
+/// What a deck is.
+enum Read {
+    /// Bricks, shells and bars, as members have them.
+    Members(Work),
+    /// Any solids, linear elastic.
+    Linear(linear::Read),
+}
+
 /// A deck of another program.
-fn deck(args: &args::Analyze, kind: &str) -> Result<Work, Failure> {
+fn deck(args: &args::Analyze, kind: &str) -> Result<Read, Failure> {
     let path = &args.scene;
     let Some(units) = args.units else {
         return Err(Failure::Usage(format!(
@@ -350,7 +362,14 @@ fn deck(args: &args::Analyze, kind: &str) -> Result<Work, Failure> {
         }
     }
     let bytes = read::bytes(path)?;
+    let hash = blake3::hash(&bytes).to_hex().to_string();
+    let name =
+        path.file_stem().map_or_else(|| "deck".into(), |stem| stem.to_string_lossy().into_owned());
     let deck = if kind == "inp" {
+        if concerns(&bytes) {
+            let deck = intrados_mechanics::linear::parse(&bytes, path, units)?;
+            return Ok(Read::Linear(linear::Read { deck, name, hash }));
+        }
         read::abaqus::parse(&bytes, path, units)?
     } else {
         read::gmsh::parse(&bytes, path, units)?
@@ -364,20 +383,11 @@ fn deck(args: &args::Analyze, kind: &str) -> Result<Work, Failure> {
             deck.mesh.hexes.len()
         )));
     }
-    let name =
-        path.file_stem().map_or_else(|| "deck".into(), |stem| stem.to_string_lossy().into_owned());
     let case =
         Case::new(deck).map_err(|why| Failure::BadInput(format!("{}: {why}", path.display())))?;
     let prepared = vec![case.prepared(&name)];
     let names = prepared.iter().map(|p| (p.id.clone(), file_name(&p.id))).collect();
-    Ok(Work {
-        prepared,
-        names,
-        name,
-        hash: blake3::hash(&bytes).to_hex().to_string(),
-        is_scene: false,
-        loads: Vec::new(),
-    })
+    Ok(Read::Members(Work { prepared, names, name, hash, is_scene: false, loads: Vec::new() }))
 }
 
 /// A life with its files, and what is seen of it from outside.

@@ -8,6 +8,7 @@ mod detect;
 mod experiment;
 mod import;
 mod info;
+pub(crate) mod linear;
 mod measure;
 mod merge;
 mod new;

@@ -23,6 +23,7 @@ pub mod tensor;
 
 // Files of others, and for others.
 pub mod deck;
+pub mod linear;
 pub mod read;
 pub mod write;
 

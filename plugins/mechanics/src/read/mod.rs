@@ -130,21 +130,21 @@ impl ReadError {
 
 /// What is wrong and in which line; the file's name is added at the door.
 #[derive(Debug)]
-struct Fault {
-    line: Option<u32>,
-    reason: String,
+pub(crate) struct Fault {
+    pub(crate) line: Option<u32>,
+    pub(crate) reason: String,
 }
 
 impl Fault {
-    fn at(line: u32, reason: impl Into<String>) -> Self {
+    pub(crate) fn at(line: u32, reason: impl Into<String>) -> Self {
         Self { line: Some(line), reason: reason.into() }
     }
 
-    fn whole(reason: impl Into<String>) -> Self {
+    pub(crate) fn whole(reason: impl Into<String>) -> Self {
         Self { line: None, reason: reason.into() }
     }
 
-    fn of(self, path: &Path) -> ReadError {
+    pub(crate) fn of(self, path: &Path) -> ReadError {
         ReadError::Bad { path: path.to_owned(), line: self.line, reason: self.reason }
     }
 }
@@ -164,14 +164,14 @@ pub fn bytes(path: &Path) -> Result<Vec<u8>, ReadError> {
 }
 
 /// A word of the file for a message: short, without control characters.
-fn quote(word: &str) -> String {
+pub(crate) fn quote(word: &str) -> String {
     let clean: String =
         word.chars().take(40).map(|c| if c.is_control() { '?' } else { c }).collect();
     if word.chars().nth(40).is_some() { format!("\"{clean}…\"") } else { format!("\"{clean}\"") }
 }
 
 /// A finite number; Fortran's exponent `D` is understood.
-fn number(word: &str) -> Result<f64, String> {
+pub(crate) fn number(word: &str) -> Result<f64, String> {
     let parsed = word.parse().or_else(|e| {
         if word.contains(['d', 'D']) { word.replace(['d', 'D'], "e").parse() } else { Err(e) }
     });
@@ -184,7 +184,7 @@ fn number(word: &str) -> Result<f64, String> {
 }
 
 /// A label: a whole number from 1 to 4 294 967 294.
-fn label(word: &str) -> Result<u32, String> {
+pub(crate) fn label(word: &str) -> Result<u32, String> {
     match word.parse::<u32>() {
         Ok(n) if n > 0 && n < u32::MAX => Ok(n),
         _ if word.is_empty() => Err("a number is missing".into()),
@@ -194,7 +194,7 @@ fn label(word: &str) -> Result<u32, String> {
 
 /// Numbers of the file to positions in the mesh.
 #[derive(Debug)]
-struct LabelMap<T>(Vec<(u32, T)>);
+pub(crate) struct LabelMap<T>(Vec<(u32, T)>);
 
 impl<T> Default for LabelMap<T> {
     fn default() -> Self {
@@ -204,7 +204,7 @@ impl<T> Default for LabelMap<T> {
 
 impl<T: Copy> LabelMap<T> {
     /// Sorts the labels; two of the same: the label.
-    fn new(mut pairs: Vec<(u32, T)>) -> Result<Self, u32> {
+    pub(crate) fn new(mut pairs: Vec<(u32, T)>) -> Result<Self, u32> {
         if !pairs.is_sorted_by_key(|p| p.0) {
             pairs.sort_by_key(|p| p.0);
         }
@@ -214,7 +214,7 @@ impl<T: Copy> LabelMap<T> {
         }
     }
 
-    fn get(&self, label: u32) -> Option<T> {
+    pub(crate) fn get(&self, label: u32) -> Option<T> {
         // Mostly labels run without gaps, and the place is known.
         let guess = label.checked_sub(self.0.first()?.0)? as usize;
         if let Some(&(found, value)) = self.0.get(guess)
@@ -226,7 +226,7 @@ impl<T: Copy> LabelMap<T> {
     }
 
     /// Existing labels in a range, ascending.
-    fn range(&self, from: u32, to: u32) -> &[(u32, T)] {
+    pub(crate) fn range(&self, from: u32, to: u32) -> &[(u32, T)] {
         let start = self.0.partition_point(|p| p.0 < from);
         let end = self.0.partition_point(|p| p.0 <= to).max(start);
         &self.0[start..end]

@@ -8,19 +8,19 @@ const MAX_LINE: usize = 64 << 10;
 const MAX_CARDS: usize = 1 << 20;
 
 /// One card.
-pub(super) struct Card<'a> {
+pub(crate) struct Card<'a> {
     /// In capitals, words one space apart.
-    pub(super) name: String,
+    pub(crate) name: String,
     /// Names in capitals; values as written, without quotes.
     parameters: Vec<(String, &'a str)>,
-    pub(super) line: u32,
+    pub(crate) line: u32,
     /// The text between this card and the next, and the number of its first line.
     body: &'a str,
     body_line: u32,
 }
 
 /// Splits a deck. Data before the first card are refused.
-pub(super) fn cards(text: &str) -> Result<Vec<Card<'_>>, Fault> {
+pub(crate) fn cards(text: &str) -> Result<Vec<Card<'_>>, Fault> {
     let mut cards: Vec<Card<'_>> = Vec::new();
     let mut lines = Lines { rest: text, line: 0 };
     // Where the body of the last card begins.
@@ -113,26 +113,26 @@ fn words(text: &str) -> String {
 }
 
 impl<'a> Card<'a> {
-    pub(super) fn fault(&self, reason: impl Into<String>) -> Fault {
+    pub(crate) fn fault(&self, reason: impl Into<String>) -> Fault {
         Fault::at(self.line, reason)
     }
 
-    pub(super) fn is(&self, name: &str) -> bool {
+    pub(crate) fn is(&self, name: &str) -> bool {
         self.name == name
     }
 
     /// The value of a parameter (empty for a flag); none where it is not there.
-    pub(super) fn get(&self, name: &str) -> Option<&'a str> {
+    pub(crate) fn get(&self, name: &str) -> Option<&'a str> {
         self.parameters.iter().find(|p| p.0 == name).map(|p| p.1)
     }
 
     /// The value of a parameter in capitals; none where it is not there.
-    pub(super) fn word(&self, name: &str) -> Option<String> {
+    pub(crate) fn word(&self, name: &str) -> Option<String> {
         self.get(name).map(words)
     }
 
     /// A name that must be there.
-    pub(super) fn need(&self, name: &str) -> Result<String, Fault> {
+    pub(crate) fn need(&self, name: &str) -> Result<String, Fault> {
         match self.get(name) {
             Some(value) if !value.is_empty() => Ok(value.to_ascii_uppercase()),
             _ => Err(self.fault(format!("*{} needs {name}=…", self.name))),
@@ -140,7 +140,7 @@ impl<'a> Card<'a> {
     }
 
     /// Refuses parameters other than these, and any of them twice.
-    pub(super) fn only(&self, allowed: &[&str]) -> Result<(), Fault> {
+    pub(crate) fn only(&self, allowed: &[&str]) -> Result<(), Fault> {
         for (i, (name, _)) in self.parameters.iter().enumerate() {
             if !allowed.contains(&name.as_str()) {
                 let allowed =
@@ -159,7 +159,7 @@ impl<'a> Card<'a> {
     }
 
     /// Data lines with their numbers, without comments and empty lines.
-    pub(super) fn rows(&self) -> impl Iterator<Item = Row<'a>> + use<'a> {
+    pub(crate) fn rows(&self) -> impl Iterator<Item = Row<'a>> + use<'a> {
         (self.body_line..)
             .zip(self.body.split('\n'))
             .map(|(line, text)| Row { line, text: text.trim() })
@@ -167,7 +167,7 @@ impl<'a> Card<'a> {
     }
 
     /// The only data line; none where there is none.
-    pub(super) fn one_row(&self) -> Result<Option<Row<'a>>, Fault> {
+    pub(crate) fn one_row(&self) -> Result<Option<Row<'a>>, Fault> {
         let mut rows = self.rows();
         let first = rows.next();
         match rows.next() {
@@ -183,7 +183,7 @@ impl<'a> Card<'a> {
     }
 
     /// Refuses data lines.
-    pub(super) fn no_rows(&self) -> Result<(), Fault> {
+    pub(crate) fn no_rows(&self) -> Result<(), Fault> {
         match self.rows().next() {
             Some(row) => Err(row.fault(format!(
                 "*{} has no data, but here is {}",
@@ -197,27 +197,27 @@ impl<'a> Card<'a> {
 
 /// A data line.
 #[derive(Clone, Copy)]
-pub(super) struct Row<'a> {
-    pub(super) line: u32,
-    pub(super) text: &'a str,
+pub(crate) struct Row<'a> {
+    pub(crate) line: u32,
+    pub(crate) text: &'a str,
 }
 
 impl<'a> Row<'a> {
-    pub(super) fn fault(&self, reason: impl Into<String>) -> Fault {
+    pub(crate) fn fault(&self, reason: impl Into<String>) -> Fault {
         Fault::at(self.line, reason)
     }
 
     /// Fields between commas; one comma at the end does not count.
-    pub(super) fn fields(&self) -> impl Iterator<Item = &'a str> + Clone + use<'a> {
+    pub(crate) fn fields(&self) -> impl Iterator<Item = &'a str> + Clone + use<'a> {
         self.text.strip_suffix(',').unwrap_or(self.text).split(',').map(str::trim)
     }
 
-    pub(super) fn number(&self, word: &str) -> Result<f64, Fault> {
+    pub(crate) fn number(&self, word: &str) -> Result<f64, Fault> {
         number(word).map_err(|e| self.fault(e))
     }
 
     /// Exactly `N` fields.
-    pub(super) fn exactly<const N: usize>(&self, what: &str) -> Result<[&'a str; N], Fault> {
+    pub(crate) fn exactly<const N: usize>(&self, what: &str) -> Result<[&'a str; N], Fault> {
         let mut fields = self.fields();
         let mut found = [""; N];
         for slot in &mut found {
@@ -232,7 +232,7 @@ impl<'a> Row<'a> {
     }
 
     /// All fields as numbers.
-    pub(super) fn numbers(
+    pub(crate) fn numbers(
         &self,
         what: &str,
         count: std::ops::RangeInclusive<usize>,

@@ -15,7 +15,7 @@
 //! Names are compared without regard to case. The Abaqus order 11, 22, 33, 12, 13, 23 of stresses
 //! becomes ours.
 
-mod card;
+pub(crate) mod card;
 mod load;
 mod model;
 mod property;
@@ -60,6 +60,25 @@ const OUTPUT: [&str; 22] = [
     "MONITOR",
 ];
 
+/// Types of elements that are read.
+const ELEMENTS: [&str; 6] = ["C3D8", "C3D8I", "C3D8R", "T3D2", "S4", "S4R"];
+
+/// Whether a card only concerns what is printed.
+pub(crate) fn is_output(card: &Card<'_>) -> bool {
+    OUTPUT.contains(&card.name.as_str())
+}
+
+/// Whether this reader understands a card.
+pub(crate) fn knows(card: &Card<'_>) -> bool {
+    let named = |s: &str| s.strip_prefix('*') == Some(card.name.as_str());
+    is_output(card) || SUPPORTED.split(", ").flat_map(|part| part.split(" and ")).any(named)
+}
+
+/// Whether this reader takes elements of a type.
+pub(crate) fn knows_element(name: &str) -> bool {
+    ELEMENTS.contains(&name)
+}
+
 /// Reads a deck.
 ///
 /// # Errors
@@ -94,7 +113,7 @@ fn deck(bytes: &[u8], units: Units) -> Result<Deck, Fault> {
 }
 
 /// The file as text; a byte that is none is named by its line.
-fn text(bytes: &[u8]) -> Result<&str, Fault> {
+pub(crate) fn text(bytes: &[u8]) -> Result<&str, Fault> {
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let line = |end: usize| 1 + bytes[..end].iter().filter(|&&b| b == b'\n').count() as u32;
     if let Some(zero) = bytes.iter().position(|&b| b == 0) {
@@ -164,16 +183,12 @@ impl Reader {
     /// Refuses a card that nobody understands, before anything is computed from the others.
     fn admit(&mut self, card: &Card) -> Result<(), Fault> {
         let name = card.name.as_str();
-        if OUTPUT.contains(&name) {
+        if is_output(card) {
             self.skipped.entry(card.name.clone()).or_insert((card.line, 0)).1 += 1;
             return Ok(());
         }
-        let known = SUPPORTED
-            .split(", ")
-            .flat_map(|part| part.split(" and "))
-            .any(|s| s.strip_prefix('*') == Some(name));
         match name {
-            _ if known => Ok(()),
+            _ if knows(card) => Ok(()),
             "INCLUDE" => Err(card.fault("*INCLUDE is not followed: put the other file's lines here")),
             "PART" | "ASSEMBLY" | "INSTANCE" | "END PART" | "END ASSEMBLY" | "END INSTANCE" => {
                 Err(card

@@ -1,0 +1,152 @@
+//! `intrados analyze` of a linear elastic deck of any solids.
+
+use std::fmt::Write as _;
+
+use intrados_mechanics::{
+    linear::{Deck, LinearError, Solved},
+    tensor::von_mises,
+};
+use intrados_stage::cpu_seconds;
+use serde::Serialize;
+
+use crate::{
+    args,
+    failure::{Failure, Outcome},
+    output::{self, Files},
+    session::Session,
+};
+
+/// A deck that was read.
+pub(crate) struct Read {
+    pub(crate) deck: Deck,
+    pub(crate) name: String,
+    /// BLAKE3 of the file.
+    pub(crate) hash: String,
+}
+
+/// Schema `intrados.deck/1`.
+#[derive(Debug, Serialize)]
+struct Report {
+    schema: &'static str,
+    version: &'static str,
+    deck: String,
+    deck_hash: String,
+    nodes: usize,
+    elements: usize,
+    cpu_seconds: f64,
+    steps: Vec<Step>,
+    notes: Vec<String>,
+    files: Vec<String>,
+}
+
+/// The end of a step.
+#[derive(Debug, Serialize)]
+struct Step {
+    name: String,
+    unknowns: usize,
+    max_displacement_m: f64,
+    max_von_mises_pa: f64,
+}
+
+/// Computes it and writes what came out.
+pub(crate) fn run(
+    session: &Session,
+    args: &args::Analyze,
+    read: &Read,
+) -> Result<Outcome, Failure> {
+    let of_members = [
+        (args.to_failure.is_some(), "--to-failure"),
+        (args.crack_law.is_some(), "--crack-law"),
+        (args.tolerance.is_some(), "--tolerance"),
+    ];
+    if let Some((_, option)) = of_members.into_iter().find(|(given, _)| *given) {
+        return Err(Failure::Usage(format!(
+            "{option}: this deck is linear elastic, and solved directly"
+        )));
+    }
+    let begin = cpu_seconds();
+    let _progress = session.watch(read.name.clone());
+    let solved = read.deck.solve(&session.job).map_err(|why| match why {
+        LinearError::Cancelled(_) => Failure::Interrupted,
+        why => Failure::BadInput(format!("{}: {why}", args.scene.display())),
+    })?;
+    let mut report = Report {
+        schema: "intrados.deck/1",
+        version: env!("CARGO_PKG_VERSION"),
+        deck: read.name.clone(),
+        deck_hash: read.hash.clone(),
+        nodes: read.deck.labels().len(),
+        elements: read.deck.elements().count(),
+        cpu_seconds: cpu_seconds() - begin,
+        steps: solved.iter().map(step).collect(),
+        notes: read.deck.notes.clone(),
+        files: Vec::new(),
+    };
+    if let Some(out) = &args.out {
+        const LIST: &str = "analyze.json";
+        let mut files = output::begin(out)?;
+        files.write("displacements.csv", displacements(&read.deck, &solved).as_bytes())?;
+        files.write("stresses.csv", stresses(&read.deck, &solved).as_bytes())?;
+        report.files = files.listed(LIST);
+        files.finish(LIST, &report)?;
+    }
+    session.print(&report, || table(&report))?;
+    Ok(Outcome::Done)
+}
+
+fn step(solved: &Solved) -> Step {
+    let largest = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0, f64::max);
+    Step {
+        name: solved.name.clone(),
+        unknowns: solved.unknowns,
+        max_displacement_m: largest(&mut solved.displacements.iter().map(|u| u.length())),
+        max_von_mises_pa: largest(&mut solved.stresses.iter().flatten().map(von_mises)),
+    }
+}
+
+/// One row a node and step. Writing to a string cannot fail.
+fn displacements(deck: &Deck, solved: &[Solved]) -> String {
+    let mut text = String::from("step,node,x_m,y_m,z_m\n");
+    for (k, step) in solved.iter().enumerate() {
+        for (label, u) in deck.labels().iter().zip(&step.displacements) {
+            let _ = writeln!(text, "{},{label},{:?},{:?},{:?}", k + 1, u.x, u.y, u.z);
+        }
+    }
+    text
+}
+
+/// One row a point of integration and step.
+fn stresses(deck: &Deck, solved: &[Solved]) -> String {
+    let mut text = String::from("step,element,point,xx_pa,yy_pa,zz_pa,xy_pa,yz_pa,zx_pa\n");
+    for (k, step) in solved.iter().enumerate() {
+        for (label, points) in deck.elements().zip(&step.stresses) {
+            for (p, s) in points.iter().enumerate() {
+                let [xx, yy, zz, xy, yz, zx] = s;
+                let _ = writeln!(
+                    text,
+                    "{},{label},{},{xx:?},{yy:?},{zz:?},{xy:?},{yz:?},{zx:?}",
+                    k + 1,
+                    p + 1
+                );
+            }
+        }
+    }
+    text
+}
+
+fn table(report: &Report) -> String {
+    let mut text = format!(
+        "{}: {} nodes, {} elements, linear elastic\n",
+        report.deck, report.nodes, report.elements
+    );
+    for step in &report.steps {
+        let _ = writeln!(
+            text,
+            "{}: {} unknowns, largest displacement {:.4e} m, largest von Mises stress {:.4e} Pa",
+            step.name, step.unknowns, step.max_displacement_m, step.max_von_mises_pa
+        );
+    }
+    report.notes.iter().for_each(|note| text += &format!("note {note}\n"));
+    report.files.iter().for_each(|file| text += &format!("file {file}\n"));
+    text
+}

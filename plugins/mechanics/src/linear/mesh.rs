@@ -1,0 +1,304 @@
+//! Nodes, elements, sets and surfaces.
+
+use std::ops::RangeInclusive;
+
+use glam::DVec3;
+
+use super::{
+    flat::{Flat, Plane, Sides, thicken},
+    model::Cell,
+    read::{Kind, Raw, Reader, Section, Surface, plain},
+    shape::Shape,
+};
+use crate::read::{
+    Fault, LabelMap,
+    abaqus::card::{Card, Row},
+    label, quote,
+};
+
+/// Nodes or elements of a deck: more are a mistake.
+const MAX_COUNT: usize = 5_000_000;
+
+/// What an element type is; `None`: not computed.
+pub(super) fn kind(name: &str) -> Option<Kind> {
+    let solid = match name {
+        "C3D8" => Some(Shape::Hex8),
+        "C3D20" => Some(Shape::Hex20),
+        "C3D20R" => Some(Shape::Hex20Reduced),
+        "C3D4" => Some(Shape::Tet4),
+        "C3D10" => Some(Shape::Tet10),
+        "C3D6" => Some(Shape::Wedge6),
+        "C3D15" => Some(Shape::Wedge15),
+        _ => None,
+    };
+    if let Some(shape) = solid {
+        return Some(Kind::Solid(shape));
+    }
+    let (family, nodes) = name.split_at_checked(3)?;
+    let plane = match family {
+        "CPS" => Plane::Stress,
+        "CPE" => Plane::Strain,
+        "CAX" => Plane::Around,
+        _ => return None,
+    };
+    let (corners, shape) = match nodes {
+        "3" => (3, Shape::Wedge6),
+        "4" => (4, Shape::Hex8),
+        "6" => (3, Shape::Wedge15),
+        "8" => (4, Shape::Hex20),
+        "8R" => (4, Shape::Hex20Reduced),
+        _ => return None,
+    };
+    Some(Kind::Flat(Flat { plane, corners, shape }))
+}
+
+impl Kind {
+    fn nodes(self) -> usize {
+        match self {
+            Self::Solid(shape) => shape.nodes(),
+            Self::Flat(flat) => flat.nodes(),
+        }
+    }
+
+    /// The face of the solid that side `number`, from 1, is.
+    fn face(self, number: u8) -> Option<u8> {
+        match self {
+            Self::Solid(shape) => {
+                (1..=shape.faces().len()).contains(&usize::from(number)).then(|| number - 1)
+            }
+            // Sides of a plane follow the two faces that close it.
+            Self::Flat(flat) => {
+                (1..=flat.corners).contains(&usize::from(number)).then_some(number + 1)
+            }
+        }
+    }
+}
+
+impl Reader {
+    /// Nodes first; elements name them.
+    pub(super) fn meshed(&mut self, card: &Card<'_>) -> Result<(), Fault> {
+        match plain(card).as_str() {
+            "NODE" => self.read_nodes(card),
+            _ => Ok(()),
+        }
+    }
+
+    /// Elements, sets and surfaces in the order of the file.
+    pub(super) fn grouped(&mut self, card: &Card<'_>) -> Result<(), Fault> {
+        match plain(card).as_str() {
+            "ELEMENT" => self.read_elements(card),
+            "NSET" => self.node_set(card),
+            "ELSET" => self.element_set(card),
+            "SURFACE" => self.surface(card),
+            _ => Ok(()),
+        }
+    }
+
+    fn read_nodes(&mut self, card: &Card<'_>) -> Result<(), Fault> {
+        card.only(&["NSET"])?;
+        let first = self.deck.labels.len() as u32;
+        for row in card.rows() {
+            let fields: Vec<&str> = row.fields().collect();
+            // Coordinates that are not there are nothing; what follows them (normals of shells)
+            // says nothing of solids.
+            let [number, rest @ ..] = fields.as_slice() else { continue };
+            let mut place = [0.0; 3];
+            for (slot, word) in place.iter_mut().zip(rest).filter(|(_, w)| !w.is_empty()) {
+                *slot = row.number(word)?;
+            }
+            if self.deck.labels.len() == MAX_COUNT {
+                return Err(row.fault(format!("more than {MAX_COUNT} nodes")));
+            }
+            self.deck.labels.push(label(number).map_err(|e| row.fault(e))?);
+            self.deck.nodes.push(self.units.length() * DVec3::from_array(place));
+        }
+        let last = self.deck.labels.len() as u32;
+        if let Some(set) = name_of(card, "NSET")? {
+            self.node_sets.entry(set).or_default().extend(first..last);
+        }
+        let pairs = self.deck.labels.iter().copied().zip(0..).collect();
+        self.nodes = LabelMap::new(pairs)
+            .map_err(|twice| card.fault(format!("node {twice} is defined a second time")))?;
+        Ok(())
+    }
+
+    fn read_elements(&mut self, card: &Card<'_>) -> Result<(), Fault> {
+        card.only(&["TYPE", "ELSET"])?;
+        let kind = card.word("TYPE").and_then(|t| kind(&t));
+        let kind = kind.ok_or_else(|| card.fault("*ELEMENT needs TYPE=…"))?;
+        let first = self.raw.len() as u32;
+        let mut rows = card.rows();
+        while let Some(row) = rows.next() {
+            let element = self.element(kind, row, &mut rows)?;
+            if self.raw.len() == MAX_COUNT {
+                return Err(row.fault(format!("more than {MAX_COUNT} elements")));
+            }
+            self.raw.push(element);
+        }
+        if let Some(set) = name_of(card, "ELSET")? {
+            self.element_sets.entry(set).or_default().extend(first..self.raw.len() as u32);
+        }
+        let pairs = self.raw.iter().map(|r| r.label).zip(0..).collect();
+        self.elements = LabelMap::new(pairs)
+            .map_err(|twice| card.fault(format!("element {twice} is defined a second time")))?;
+        Ok(())
+    }
+
+    /// An element whose nodes go on in the next lines until all are there.
+    fn element<'a>(
+        &self,
+        kind: Kind,
+        row: Row<'a>,
+        rows: &mut impl Iterator<Item = Row<'a>>,
+    ) -> Result<Raw, Fault> {
+        let mut fields: Vec<&str> = row.fields().collect();
+        while fields.len() < kind.nodes() + 1 {
+            let next = rows.next().ok_or_else(|| {
+                row.fault(format!("{} nodes, not {}", fields.len() - 1, kind.nodes()))
+            })?;
+            fields.extend(next.fields());
+        }
+        let [number, nodes @ ..] = fields.as_slice() else {
+            return Err(row.fault("an element needs its number and its nodes"));
+        };
+        if nodes.len() > kind.nodes() {
+            return Err(row.fault(format!("{} nodes, not {}", nodes.len(), kind.nodes())));
+        }
+        let label = label(number).map_err(|e| row.fault(e))?;
+        let nodes = nodes.iter().map(|n| self.node(n, row)).collect::<Result<Vec<_>, _>>()?;
+        Ok(Raw { label, kind, nodes, section: None, line: row.line })
+    }
+
+    fn node_set(&mut self, card: &Card<'_>) -> Result<(), Fault> {
+        card.only(&["NSET", "GENERATE", "UNSORTED"])?;
+        let mut set = Vec::new();
+        for row in card.rows() {
+            if card.get("GENERATE").is_some() {
+                set.extend(generated(&self.nodes, row)?);
+                continue;
+            }
+            for word in row.fields().filter(|w| !w.is_empty()) {
+                set.extend(self.some_nodes(word, row)?);
+            }
+        }
+        join(self.node_sets.entry(card.need("NSET")?).or_default(), set);
+        Ok(())
+    }
+
+    fn element_set(&mut self, card: &Card<'_>) -> Result<(), Fault> {
+        card.only(&["ELSET", "GENERATE", "UNSORTED"])?;
+        let mut set = Vec::new();
+        for row in card.rows() {
+            if card.get("GENERATE").is_some() {
+                set.extend(generated(&self.elements, row)?);
+                continue;
+            }
+            for word in row.fields().filter(|w| !w.is_empty()) {
+                set.extend(self.some_elements(word, row)?);
+            }
+        }
+        join(self.element_sets.entry(card.need("ELSET")?).or_default(), set);
+        Ok(())
+    }
+
+    fn surface(&mut self, card: &Card<'_>) -> Result<(), Fault> {
+        card.only(&["NAME", "TYPE"])?;
+        let surface = match card.word("TYPE").as_deref() {
+            Some("NODE") => {
+                let mut nodes = Vec::new();
+                for row in card.rows() {
+                    for word in row.fields().filter(|w| !w.is_empty()) {
+                        nodes.extend(self.some_nodes(word, row)?);
+                    }
+                }
+                Surface::Nodes(nodes)
+            }
+            None | Some("ELEMENT") => {
+                let mut faces = Vec::new();
+                for row in card.rows() {
+                    let [target, side] = row.exactly("element or element set, S1 to S6")?;
+                    for element in self.some_elements(target, row)? {
+                        faces.push((element, self.face(element, side, "S", row)?));
+                    }
+                }
+                Surface::Faces(faces)
+            }
+            Some(other) => {
+                let other = quote(other);
+                return Err(card.fault(format!("TYPE={other}: NODE and ELEMENT are supported")));
+            }
+        };
+        self.surfaces.insert(card.need("NAME")?, surface);
+        Ok(())
+    }
+
+    /// The face that `P3` or `S3` (by `letter`) is.
+    pub(super) fn face(
+        &self,
+        element: u32,
+        side: &str,
+        letter: &str,
+        row: Row<'_>,
+    ) -> Result<u8, Fault> {
+        let upper = side.to_ascii_uppercase();
+        let number = upper.strip_prefix(letter).and_then(|n| n.parse::<u8>().ok());
+        let raw = &self.raw[element as usize];
+        number
+            .and_then(|n| raw.kind.face(n))
+            .ok_or_else(|| row.fault(format!("element {} has no side {}", raw.label, quote(side))))
+    }
+
+    /// Elements to solids, now that all is known of them.
+    pub(super) fn make(&mut self) -> Result<(), Fault> {
+        if self.raw.is_empty() {
+            return Err(Fault::whole("no elements: a deck needs *NODE and *ELEMENT"));
+        }
+        let mut sides = Sides::new();
+        for raw in &self.raw {
+            let Some(section) = raw.section else {
+                let why = format!("element {} has no *SOLID SECTION", raw.label);
+                return Err(Fault::at(raw.line, why));
+            };
+            if !self.elastic.contains(&section.material) {
+                let name = &self.deck.materials[section.material as usize].name;
+                return Err(Fault::at(raw.line, format!("material {name} has no *ELASTIC")));
+            }
+            let (shape, nodes) = match raw.kind {
+                Kind::Solid(shape) => (shape, raw.nodes.clone()),
+                Kind::Flat(flat) => {
+                    let thickness = section.thickness;
+                    let deck = &mut self.deck;
+                    (flat.shape, thicken(deck, flat, &raw.nodes, thickness, &mut sides))
+                }
+            };
+            let Section { material, orientation, .. } = section;
+            self.deck.cells.push(Cell { label: raw.label, shape, nodes, material, orientation });
+        }
+        self.deck.cold = vec![0.0; self.deck.nodes.len()];
+        Ok(())
+    }
+}
+
+/// `first, last, increment`: those that exist.
+fn generated(map: &LabelMap<u32>, row: Row<'_>) -> Result<Vec<u32>, Fault> {
+    let numbers = row.fields().map(label).collect::<Result<Vec<u32>, _>>();
+    let (first, last, step) = match numbers.map_err(|e| row.fault(e))?.as_slice() {
+        [first] => (*first, *first, 1),
+        [first, last] => (*first, *last, 1),
+        [first, last, step] => (*first, *last, *step),
+        _ => return Err(row.fault("GENERATE needs: first, last, increment")),
+    };
+    let range: RangeInclusive<u32> = first..=last;
+    let found = map.range(*range.start(), *range.end()).iter();
+    Ok(found.filter(|(l, _)| (l - first) % step == 0).map(|p| p.1).collect())
+}
+
+fn join(set: &mut Vec<u32>, more: Vec<u32>) {
+    set.extend(more);
+    set.sort_unstable();
+    set.dedup();
+}
+
+pub(super) fn name_of(card: &Card<'_>, parameter: &str) -> Result<Option<String>, Fault> {
+    card.get(parameter).map(|_| card.need(parameter)).transpose()
+}

@@ -1,0 +1,263 @@
+//! Cards of a deck to a [`Deck`].
+
+use std::{
+    collections::{BTreeMap, BTreeSet, HashMap},
+    path::Path,
+};
+
+use super::{flat::Flat, model::Deck, shape::Shape, steps::State};
+use crate::read::{
+    Fault, LabelMap, ReadError, Units,
+    abaqus::{
+        self,
+        card::{Card, Row, cards},
+    },
+    label, quote,
+};
+
+/// Cards that are read, without their spaces.
+const KNOWN: [&str; 25] = [
+    "NODE",
+    "ELEMENT",
+    "NSET",
+    "ELSET",
+    "SURFACE",
+    "MATERIAL",
+    "ELASTIC",
+    "DENSITY",
+    "EXPANSION",
+    "CONDUCTIVITY",
+    "SPECIFICHEAT",
+    "SOLIDSECTION",
+    "ORIENTATION",
+    "AMPLITUDE",
+    "TRANSFORM",
+    "EQUATION",
+    "TIE",
+    "INITIALCONDITIONS",
+    "BOUNDARY",
+    "STEP",
+    "STATIC",
+    "CLOAD",
+    "DLOAD",
+    "DSLOAD",
+    "TEMPERATURE",
+];
+/// Cards that only say how contact would behave: without contact they say nothing.
+const CONTACT: [&str; 3] = ["SURFACEINTERACTION", "SURFACEBEHAVIOR", "FRICTION"];
+/// Faults that one line names.
+const NAMED: usize = 12;
+
+/// Whether a deck has something in it that the reader of decks for members does not know, and so
+/// this one is asked.
+#[must_use]
+pub fn concerns(bytes: &[u8]) -> bool {
+    let Ok(cards) = abaqus::text(bytes).and_then(cards) else { return false };
+    cards.iter().any(|card| {
+        !abaqus::knows(card)
+            || card.get("ORIENTATION").is_some()
+            || (card.is("ELEMENT")
+                && !abaqus::knows_element(&card.word("TYPE").unwrap_or_default()))
+    })
+}
+
+/// Reads a deck from memory; `name` is what errors call it.
+///
+/// # Errors
+/// Everything that is damaged or not computed, in one line.
+pub fn parse(bytes: &[u8], name: &Path, units: Units) -> Result<Deck, ReadError> {
+    deck(bytes, units).map_err(|fault| fault.of(name))
+}
+
+fn deck(bytes: &[u8], units: Units) -> Result<Deck, Fault> {
+    let cards = cards(abaqus::text(bytes)?)?;
+    if cards.is_empty() {
+        return Err(Fault::whole("no cards in it; a deck has lines like *NODE and *ELEMENT"));
+    }
+    let mut reader = Reader::new(units);
+    reader.admit(&cards);
+    reader.fail()?;
+    // What names something comes after it, wherever it stands in the file.
+    for pass in [Reader::meshed, Reader::grouped, Reader::material, Reader::section] {
+        cards.iter().for_each(|card| {
+            let read = pass(&mut reader, card);
+            reader.keep(read);
+        });
+        reader.fail()?;
+    }
+    let made = reader.make();
+    reader.keep(made);
+    reader.fail()?;
+    let mut state = State::default();
+    for card in &cards {
+        let read = reader.history(card, &mut state);
+        reader.keep(read);
+    }
+    let ended = state.ended();
+    reader.keep(ended);
+    // Ties last: what is bound otherwise stays as it is.
+    for pass in [Reader::equation, Reader::tied] {
+        cards.iter().for_each(|card| {
+            let read = pass(&mut reader, card);
+            reader.keep(read);
+        });
+    }
+    reader.fail()?;
+    Ok(reader.deck)
+}
+
+/// What an element of the file is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Kind {
+    Solid(Shape),
+    Flat(Flat),
+}
+
+/// An element as the file has it.
+#[derive(Debug, Clone)]
+pub(super) struct Raw {
+    pub(super) label: u32,
+    pub(super) kind: Kind,
+    pub(super) nodes: Vec<u32>,
+    pub(super) section: Option<Section>,
+    pub(super) line: u32,
+}
+
+/// What an element is made of.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Section {
+    pub(super) material: u32,
+    pub(super) orientation: Option<u32>,
+    pub(super) thickness: f64,
+}
+
+/// What a surface is made of.
+#[derive(Debug, Clone)]
+pub(super) enum Surface {
+    Nodes(Vec<u32>),
+    Faces(Vec<(u32, u8)>),
+}
+
+/// What has been read so far.
+pub(super) struct Reader {
+    pub(super) units: Units,
+    pub(super) deck: Deck,
+    pub(super) nodes: LabelMap<u32>,
+    pub(super) elements: LabelMap<u32>,
+    pub(super) raw: Vec<Raw>,
+    pub(super) node_sets: BTreeMap<String, Vec<u32>>,
+    pub(super) element_sets: BTreeMap<String, Vec<u32>>,
+    pub(super) surfaces: HashMap<String, Surface>,
+    pub(super) materials: HashMap<String, u32>,
+    pub(super) orientations: HashMap<String, u32>,
+    pub(super) amplitudes: HashMap<String, crate::read::Amplitude>,
+    /// Materials that have an elastic law.
+    pub(super) elastic: BTreeSet<u32>,
+    pub(super) in_material: bool,
+    faults: Vec<Fault>,
+}
+
+impl Reader {
+    fn new(units: Units) -> Self {
+        Self {
+            units,
+            deck: Deck::default(),
+            nodes: LabelMap::default(),
+            elements: LabelMap::default(),
+            raw: Vec::new(),
+            node_sets: BTreeMap::new(),
+            element_sets: BTreeMap::new(),
+            surfaces: HashMap::new(),
+            materials: HashMap::new(),
+            orientations: HashMap::new(),
+            amplitudes: HashMap::new(),
+            elastic: BTreeSet::new(),
+            in_material: false,
+            faults: Vec::new(),
+        }
+    }
+
+    fn keep(&mut self, read: Result<(), Fault>) {
+        self.faults.extend(read.err());
+    }
+
+    /// All faults so far as one.
+    fn fail(&mut self) -> Result<(), Fault> {
+        let mut faults = std::mem::take(&mut self.faults);
+        if faults.is_empty() {
+            return Ok(());
+        }
+        let first = faults.remove(0);
+        let mut reason = first.reason;
+        for fault in faults.iter().take(NAMED - 1) {
+            let line = fault.line.map_or(String::new(), |l| format!("line {l}: "));
+            reason += &format!("; {line}{}", fault.reason);
+        }
+        if faults.len() >= NAMED {
+            reason += &format!("; and {} more", faults.len() + 1 - NAMED);
+        }
+        Err(Fault { line: first.line, reason })
+    }
+
+    /// Names all that is not computed, each once.
+    fn admit(&mut self, cards: &[Card<'_>]) {
+        let has_contact = cards.iter().any(|c| c.is("CONTACT PAIR") || c.is("CLEARANCE"));
+        let mut seen = BTreeSet::new();
+        for card in cards {
+            let name = plain(card);
+            let what = if name == "ELEMENT" {
+                let kind = card.word("TYPE").unwrap_or_default();
+                if super::mesh::kind(&kind).is_some() || !seen.insert(kind.clone()) {
+                    continue;
+                }
+                format!("elements of type {} are not computed", quote(&kind))
+            } else {
+                let idle = CONTACT.contains(&name.as_str()) && !has_contact;
+                let known = KNOWN.contains(&name.as_str()) || name == "ENDSTEP";
+                if known || idle || abaqus::is_output(card) || !seen.insert(name) {
+                    continue;
+                }
+                format!("*{} is not computed", quote(&card.name).trim_matches('"'))
+            };
+            self.faults.push(card.fault(what));
+        }
+        if let Some(last) = self.faults.last_mut() {
+            last.reason += "; decks of linear elastic solids under static loads are";
+        }
+    }
+
+    pub(super) fn node(&self, word: &str, row: Row<'_>) -> Result<u32, Fault> {
+        let label = label(word).map_err(|e| row.fault(e))?;
+        self.nodes.get(label).ok_or_else(|| row.fault(format!("node {label} is not defined")))
+    }
+
+    /// A node, or a set of them.
+    pub(super) fn some_nodes(&self, word: &str, row: Row<'_>) -> Result<Vec<u32>, Fault> {
+        if is_number(word) {
+            return Ok(vec![self.node(word, row)?]);
+        }
+        let undefined = || row.fault(format!("node set {} is not defined", quote(word)));
+        self.node_sets.get(&word.to_ascii_uppercase()).cloned().ok_or_else(undefined)
+    }
+
+    /// An element, or a set of them.
+    pub(super) fn some_elements(&self, word: &str, row: Row<'_>) -> Result<Vec<u32>, Fault> {
+        if is_number(word) {
+            let label = label(word).map_err(|e| row.fault(e))?;
+            let found = self.elements.get(label);
+            let undefined = || row.fault(format!("element {label} is not defined"));
+            return Ok(vec![found.ok_or_else(undefined)?]);
+        }
+        let undefined = || row.fault(format!("element set {} is not defined", quote(word)));
+        self.element_sets.get(&word.to_ascii_uppercase()).cloned().ok_or_else(undefined)
+    }
+}
+
+/// The card's name without its spaces, as CalculiX reads it.
+pub(super) fn plain(card: &Card<'_>) -> String {
+    card.name.replace(' ', "")
+}
+
+fn is_number(word: &str) -> bool {
+    word.starts_with(|c: char| c.is_ascii_digit() || c == '-' || c == '+')
+}

@@ -1,0 +1,441 @@
+use std::{collections::BTreeMap, fmt::Write as _, path::Path};
+
+use glam::DVec3;
+use intrados_stage::Job;
+
+use super::{mesh, parse, read::Kind, shape::Shape, solve::Solved};
+use crate::{
+    deck::Case,
+    model::MarchSettings,
+    read::{Units, abaqus},
+};
+
+/// The body's law in all tests.
+const LAW: &str = "*MATERIAL,NAME=M\n*ELASTIC\n200.,.3\n*DENSITY\n3.\n*EXPANSION\n1e-3\n\
+                   *SOLID SECTION,ELSET=ALL,MATERIAL=M\n.1\n";
+
+fn solve(deck: &str) -> Vec<Solved> {
+    let deck = parse(deck.as_bytes(), Path::new("deck.inp"), Units::MetreNewton).unwrap();
+    assert!(deck.notes.is_empty(), "{:?}", deck.notes);
+    deck.solve(&Job::default()).unwrap()
+}
+
+fn refusal(deck: &str) -> String {
+    let found = parse(deck.as_bytes(), Path::new("deck.inp"), Units::MetreNewton);
+    let error = found.unwrap_err().to_string();
+    assert_eq!(error.lines().count(), 1, "{error}");
+    error
+}
+
+/// Nodes and elements of a body, numbered as they come.
+#[derive(Default)]
+struct Body {
+    nodes: Vec<DVec3>,
+    elements: Vec<Vec<usize>>,
+}
+
+impl Body {
+    fn node(&mut self, at: DVec3) -> usize {
+        match self.nodes.iter().position(|n| n.distance(at) < 1e-9) {
+            Some(known) => known,
+            None => {
+                self.nodes.push(at);
+                self.nodes.len() - 1
+            }
+        }
+    }
+
+    /// An element by its corners; middles of edges are where its shape has them.
+    fn element(&mut self, shape: Shape, corners: &[DVec3]) {
+        let edges: &[[usize; 2]] = match shape {
+            Shape::Hex20 | Shape::Hex20Reduced => &[
+                [0, 1],
+                [1, 2],
+                [2, 3],
+                [3, 0],
+                [4, 5],
+                [5, 6],
+                [6, 7],
+                [7, 4],
+                [0, 4],
+                [1, 5],
+                [2, 6],
+                [3, 7],
+            ],
+            Shape::Tet10 => &[[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]],
+            Shape::Wedge15 => {
+                &[[0, 1], [1, 2], [2, 0], [3, 4], [4, 5], [5, 3], [0, 3], [1, 4], [2, 5]]
+            }
+            _ => &[],
+        };
+        let middles = edges.iter().map(|&[a, b]| 0.5 * (corners[a] + corners[b]));
+        let places: Vec<DVec3> = corners.iter().copied().chain(middles).collect();
+        let nodes = places.into_iter().map(|p| self.node(p)).collect();
+        self.elements.push(nodes);
+    }
+
+    /// A box from `low` to `high` of elements of a type, so many along each axis.
+    fn fill(&mut self, kind: &str, [low, high]: [DVec3; 2], parts: [usize; 3]) -> Shape {
+        let Some(Kind::Solid(shape)) = mesh::kind(kind) else { panic!("{kind} is no solid") };
+        let size = (high - low) / DVec3::from_array(parts.map(|n| n as f64));
+        for (i, j, k) in (0..parts[2])
+            .flat_map(|k| (0..parts[1]).flat_map(move |j| (0..parts[0]).map(move |i| (i, j, k))))
+        {
+            let at = |[a, b, c]: [usize; 3]| {
+                low + size * DVec3::new((i + a) as f64, (j + b) as f64, (k + c) as f64)
+            };
+            let corners = [
+                [0, 0, 0],
+                [1, 0, 0],
+                [1, 1, 0],
+                [0, 1, 0],
+                [0, 0, 1],
+                [1, 0, 1],
+                [1, 1, 1],
+                [0, 1, 1],
+            ]
+            .map(at);
+            let parts: &[&[usize]] = match shape.nodes() {
+                8 | 20 => &[&[0, 1, 2, 3, 4, 5, 6, 7]],
+                6 | 15 => &[&[0, 1, 2, 4, 5, 6], &[0, 2, 3, 4, 6, 7]],
+                // Kuhn's six tetrahedra about the diagonal from 0 to 6.
+                _ => &[
+                    &[0, 1, 2, 6],
+                    &[0, 2, 3, 6],
+                    &[0, 3, 7, 6],
+                    &[0, 7, 4, 6],
+                    &[0, 4, 5, 6],
+                    &[0, 5, 1, 6],
+                ],
+            };
+            for part in parts {
+                let corners: Vec<DVec3> = part.iter().map(|&c| corners[c]).collect();
+                self.element(shape, &corners);
+            }
+        }
+        shape
+    }
+
+    fn text(&self, kind: &str) -> String {
+        let mut text = String::from("*NODE,NSET=ALL\n");
+        for (n, p) in self.nodes.iter().enumerate() {
+            writeln!(text, "{},{:?},{:?},{:?}", n + 1, p.x, p.y, p.z).unwrap();
+        }
+        writeln!(text, "*ELEMENT,TYPE={kind},ELSET=ALL").unwrap();
+        for (e, nodes) in self.elements.iter().enumerate() {
+            write!(text, "{}", e + 1).unwrap();
+            for (i, n) in nodes.iter().enumerate() {
+                write!(text, "{}{}", if i % 10 == 9 { ",\n" } else { "," }, n + 1).unwrap();
+            }
+            text.push('\n');
+        }
+        text
+    }
+
+    /// Faces whose nodes all satisfy a test, as rows of a surface.
+    fn faces(&self, shape: Shape, test: impl Fn(DVec3) -> bool) -> String {
+        let mut rows = String::new();
+        for (e, nodes) in self.elements.iter().enumerate() {
+            for (f, face) in shape.faces().enumerate() {
+                if face.iter().all(|&i| test(self.nodes[nodes[i]])) {
+                    writeln!(rows, "{},S{}", e + 1, f + 1).unwrap();
+                }
+            }
+        }
+        assert!(!rows.is_empty());
+        rows
+    }
+
+    /// Rows of supports of the nodes that satisfy a test.
+    fn held(&self, component: u8, test: impl Fn(DVec3) -> bool) -> String {
+        let nodes = self.nodes.iter().enumerate().filter(|(_, p)| test(**p));
+        nodes.map(|(n, _)| format!("{},{component}\n", n + 1)).collect()
+    }
+
+    /// Symmetry about the three planes through the origin.
+    fn corner(&self) -> String {
+        format!(
+            "*BOUNDARY\n{}{}{}",
+            self.held(1, |p| p.x.abs() < 1e-9),
+            self.held(2, |p| p.y.abs() < 1e-9),
+            self.held(3, |p| p.z.abs() < 1e-9)
+        )
+    }
+}
+
+const UNIT: [DVec3; 2] = [DVec3::ZERO, DVec3::ONE];
+const SOLIDS: [&str; 7] = ["C3D4", "C3D6", "C3D8", "C3D10", "C3D15", "C3D20", "C3D20R"];
+
+fn near(a: f64, b: f64, by: f64) {
+    assert!((a - b).abs() <= by, "{a} is not {b} within {by}");
+}
+
+/// Tension of 1 Pa along x, over E = 200, on half-turned axes where asked.
+#[test]
+fn every_solid_stretches_as_a_bar_does() {
+    for kind in SOLIDS {
+        let mut body = Body::default();
+        let shape = body.fill(kind, UNIT, [2, 1, 1]);
+        let deck = body.text(kind)
+            + LAW
+            + &body.corner()
+            + "*SURFACE,NAME=END\n"
+            + &body.faces(shape, |p| p.x > 1.0 - 1e-9)
+            + "*STEP\n*STATIC\n*DSLOAD\nEND,P,-1.\n*END STEP\n";
+        let solved = solve(&deck);
+        for (p, u) in body.nodes.iter().zip(&solved[0].displacements) {
+            let expected = DVec3::new(p.x, -0.3 * p.y, -0.3 * p.z) / 200.0;
+            near(u.distance(expected), 0.0, 1e-12);
+        }
+        for stress in solved[0].stresses.iter().flatten() {
+            near(stress[0], 1.0, 1e-10);
+            stress[1..].iter().for_each(|s| near(*s, 0.0, 1e-10));
+        }
+    }
+}
+
+/// E A/L of a bar pulled by a moved end; then warm and free: α ΔT everywhere and no stress; then
+/// both, and what earlier steps left dropped.
+#[test]
+fn steps_follow_one_another() {
+    for kind in SOLIDS {
+        let mut body = Body::default();
+        body.fill(kind, UNIT, [1, 1, 2]);
+        let top = body.held(3, |p| p.z > 1.0 - 1e-9).replace(",3\n", ",3,3,.01\n");
+        let deck = body.text(kind)
+            + LAW
+            + &body.corner()
+            + "*AMPLITUDE,NAME=A\n0.,0.,4.,2.\n*STEP\n*STATIC\n.1,2.\n*BOUNDARY,AMPLITUDE=A\n"
+            + &top
+            + "*END STEP\n*STEP\n*STATIC\n*BOUNDARY,OP=NEW\n"
+            + &body.corner()
+            + "*TEMPERATURE\nALL,20.\n*END STEP\n";
+        let deck = deck.replace("OP=NEW\n*BOUNDARY\n", "OP=NEW\n");
+        let [pulled, warm] = solve(&deck).try_into().unwrap();
+        for ((p, u), v) in body.nodes.iter().zip(&pulled.displacements).zip(&warm.displacements) {
+            near(u.z, 0.01 * p.z, 1e-12);
+            near(v.distance(0.02 * *p), 0.0, 1e-12);
+        }
+        pulled.stresses.iter().flatten().for_each(|s| near(s[2], 2.0, 1e-9));
+        warm.stresses.iter().flatten().flatten().for_each(|s| near(*s, 0.0, 1e-9));
+    }
+}
+
+/// The same bricks by the solver of members.
+#[test]
+fn bricks_bend_as_those_of_members_do() {
+    let mut body = Body::default();
+    body.fill("C3D8", [DVec3::ZERO, DVec3::new(3.0, 1.0, 0.5)], [6, 2, 2]);
+    let end = body.nodes.iter().position(|p| p.distance(DVec3::new(3.0, 1.0, 0.5)) < 1e-9).unwrap();
+    let held: String = (1..=3).map(|c| body.held(c, |p| p.x < 1e-9)).collect();
+    let deck = body.text("C3D8")
+        + LAW.strip_suffix(".1\n").unwrap()
+        + "*BOUNDARY\n"
+        + &held
+        + &format!(
+            "*STEP\n*STATIC\n*CLOAD\n{},3,.02\n*DLOAD\nALL,GRAV,.01,0,0,-1\n*END STEP\n",
+            end + 1
+        );
+    let ours = solve(&deck);
+    let case = abaqus::parse(deck.as_bytes(), Path::new("deck.inp"), Units::MetreNewton).unwrap();
+    let case = Case::new(case).unwrap();
+    let history = case.run(MarchSettings::of_deck(), &Job::default(), |_, _, _| Ok(())).unwrap();
+    let theirs: Vec<DVec3> =
+        history.x.as_chunks::<3>().0.iter().copied().map(DVec3::from_array).collect();
+    let most = theirs.iter().map(|u| u.length()).fold(0.0, f64::max);
+    assert!(most > 1e-3);
+    for (a, b) in ours[0].displacements.iter().zip(&theirs) {
+        near(a.distance(*b), 0.0, 1e-6 * most);
+    }
+}
+
+/// A law along turned axes: the constants of an isotropic one, written as engineering constants,
+/// say the same whatever the axes; a law that is stiff along one axis stretches least along it.
+#[test]
+fn laws_turn_with_their_axes() {
+    let mut body = Body::default();
+    let shape = body.fill("C3D20R", UNIT, [1, 1, 1]);
+    let pulled = |law: &str, section: &str| {
+        let deck = body.text("C3D20R")
+            + "*ORIENTATION,NAME=O\n.6,.8,0.,-.8,.6,0.\n*ORIENTATION,NAME=Q\n0.,0.,1.,1.,0.,0.\n*MATERIAL,NAME=M\n"
+            + law
+            + &format!("*SOLID SECTION,ELSET=ALL,MATERIAL=M,ORIENTATION={section}\n")
+            + &body.corner()
+            + "*SURFACE,NAME=END\n"
+            + &body.faces(shape, |p| p.z > 1.0 - 1e-9)
+            + "*STEP\n*STATIC\n*DSLOAD\nEND,P,-1.\n*END STEP\n";
+        let solved = solve(&deck);
+        let end = body.nodes.iter().position(|p| p.distance(DVec3::ONE) < 1e-9).unwrap();
+        solved[0].displacements[end]
+    };
+    let g = 200.0 / 2.6;
+    let same =
+        format!("*ELASTIC,TYPE=ENGINEERING CONSTANTS\n200.,200.,200.,.3,.3,.3,{g},{g},\n{g}\n");
+    near(pulled(&same, "O").distance(DVec3::new(-0.3, -0.3, 1.0) / 200.0), 0.0, 1e-12);
+    // Along z lies the material's first axis, of 500.
+    let stiff = "*ELASTIC,TYPE=ENGINEERING CONSTANTS\n500.,200.,100.,0.,0.,0.,80.,80.,\n80.\n";
+    near(pulled(stiff, "Q").distance(DVec3::new(0.0, 0.0, 0.002)), 0.0, 1e-12);
+}
+
+/// Two boxes, one twice as fine as the other, tied: nodes that follow a face carry a constant stress
+/// where the finer mesh refines the coarser one.
+#[test]
+fn ties_carry_tension_between_a_mesh_and_a_finer_one() {
+    let mut body = Body::default();
+    let shape = body.fill("C3D20", UNIT, [1, 4, 2]);
+    let lower = body.elements.len();
+    // The upper box has its nodes to itself: it is made far away, and put in its place.
+    let far = DVec3::new(10.0, 0.0, 0.0);
+    body.fill("C3D20", [DVec3::X + far, 2.0 * DVec3::X + DVec3::Y + DVec3::Z + far], [1, 2, 2]);
+    body.nodes.iter_mut().filter(|p| p.x > 5.0).for_each(|p| *p -= far);
+    let rows = |test: fn(DVec3) -> bool, wanted: std::ops::Range<usize>| -> String {
+        let all = body.faces(shape, test);
+        let own = all.lines().filter(|l| {
+            let e: usize = l.split(',').next().unwrap().parse().unwrap();
+            wanted.contains(&(e - 1))
+        });
+        own.map(|l| format!("{l}\n")).collect()
+    };
+    let joint = |p: DVec3| (p.x - 1.0).abs() < 1e-9;
+    let deck = body.text("C3D20")
+        + LAW
+        + &body.corner()
+        + &format!("*SURFACE,NAME=S\n{}", rows(joint, 0..lower))
+        + &format!("*SURFACE,NAME=T\n{}", rows(joint, lower..body.elements.len()))
+        + &format!("*SURFACE,NAME=END\n{}", rows(|p| p.x > 2.0 - 1e-9, lower..body.elements.len()))
+        + "*TIE,NAME=J\nS,T\n*STEP\n*STATIC\n*DSLOAD\nEND,P,-1.\n*END STEP\n";
+    let solved = solve(&deck);
+    for (p, u) in body.nodes.iter().zip(&solved[0].displacements) {
+        near(u.x, p.x / 200.0, 1e-10);
+    }
+    solved[0].stresses.iter().flatten().for_each(|s| near(s[0], 1.0, 1e-8));
+}
+
+/// Supports along and around an axis hold a ring as planes of symmetry do; equations that tie two
+/// nodes do as a support of both.
+#[test]
+fn transformed_supports_and_equations_hold_as_written() {
+    let mut body = Body::default();
+    let shape = body.fill("C3D20R", UNIT, [1, 1, 1]);
+    let mut text = body.text("C3D20R") + LAW;
+    // The cube turned by 30° about z, with all that holds it given in turned axes.
+    let (sin, cos) = (0.5, 0.75f64.sqrt());
+    let turned: Vec<DVec3> = body
+        .nodes
+        .iter()
+        .map(|p| DVec3::new(cos * p.x - sin * p.y, sin * p.x + cos * p.y, p.z))
+        .collect();
+    for (n, (p, q)) in body.nodes.iter().zip(&turned).enumerate() {
+        let [old, new] = [p, q].map(|p| format!("\n{},{:?},{:?},{:?}\n", n + 1, p.x, p.y, p.z));
+        text = text.replacen(&old, &new, 1);
+    }
+    // All nodes of the end move alike along x′, and one of them is pulled.
+    let end: Vec<usize> = (0..20).filter(|&n| body.nodes[n].x > 1.0 - 1e-9).collect();
+    let equations: String = end[1..]
+        .iter()
+        .map(|n| format!("*EQUATION\n2\n{},1,1.,{},1,-1.\n", n + 1, end[0] + 1))
+        .collect();
+    text += &format!("*TRANSFORM,NSET=ALL\n{cos:?},{sin:?},0.,{:?},{cos:?},0.\n", -sin);
+    text += &body.corner();
+    text += &equations;
+    text += &format!("*STEP\n*STATIC\n*CLOAD\n{0},1,.25\n{0},1,.75\n*END STEP\n", end[0] + 1);
+    let solved = solve(&text);
+    assert_eq!(shape.nodes(), 20);
+    for (p, u) in body.nodes.iter().zip(&solved[0].displacements) {
+        let own = DVec3::new(cos * u.x + sin * u.y, -sin * u.x + cos * u.y, u.z);
+        near(own.distance(DVec3::new(p.x, -0.3 * p.y, -0.3 * p.z) / 200.0), 0.0, 1e-12);
+    }
+}
+
+/// One plane element for the unit square, in each way of closing it, pulled by 1 Pa along x.
+#[test]
+fn planes_are_closed_as_their_names_say() {
+    let quads = |extra: &str| format!("*NODE,NSET=ALL\n1,0,0\n2,1,0\n3,1,1\n4,0,1\n{extra}");
+    let middles = "5,.5,0\n6,1,.5\n7,.5,1\n8,0,.5\n";
+    for (kind, nodes) in
+        [("CPS4", 4), ("CPS8", 8), ("CPS8R", 8), ("CPE4", 4), ("CPE8", 8), ("CPE8R", 8)]
+    {
+        let list: Vec<String> = (1..=nodes).map(|n| n.to_string()).collect();
+        let deck = quads(if nodes == 8 { middles } else { "" })
+            + &format!("*ELEMENT,TYPE={kind},ELSET=ALL\n1,{}\n", list.join(","))
+            + LAW
+            + "*BOUNDARY\n1,1,2\n2,2\n4,1\n"
+            // With four points an element has a motion without strain that only this holds.
+            + if nodes == 8 { "5,2\n8,1\n" } else { "" }
+            + "*STEP\n*STATIC\n*DLOAD\n1,P2,-1.\n*END STEP\n";
+        let u = solve(&deck)[0].displacements[2];
+        let (x, y) = if kind.starts_with("CPS") {
+            (1.0, -0.3)
+        } else {
+            // Plane strain: E/(1 − ν²) and ν/(1 − ν).
+            (0.91, -0.91 * 0.3 / 0.7)
+        };
+        near(200.0 * u.x, x, 1e-10);
+        near(200.0 * u.y, y, 1e-10);
+    }
+}
+
+/// A thin disc of radii 1 and 2 that spins: at its bore σ_θ = ρω²((3 + ν) b² + (1 − ν) a²)/4
+/// (Timoshenko and Goodier, art. 32).
+#[test]
+fn a_disc_that_spins_has_the_stress_of_the_closed_form() {
+    let (n, mut text) = (16, String::from("*NODE,NSET=ALL\n"));
+    let mut known: BTreeMap<(usize, usize), usize> = BTreeMap::new();
+    let mut elements = String::from("*ELEMENT,TYPE=CAX8,ELSET=ALL\n");
+    for e in 0..n {
+        let corners = [(2 * e, 0), (2 * e + 2, 0), (2 * e + 2, 2), (2 * e, 2)];
+        let middles = [(2 * e + 1, 0), (2 * e + 2, 1), (2 * e + 1, 2), (2 * e, 1)];
+        write!(elements, "{}", e + 1).unwrap();
+        for at in corners.into_iter().chain(middles) {
+            let next = known.len() + 1;
+            let number = *known.entry(at).or_insert(next);
+            if number == next {
+                let r = 1.0 + at.0 as f64 / (2 * n) as f64;
+                writeln!(text, "{number},{r:?},{:?}", 0.01 * at.1 as f64).unwrap();
+            }
+            write!(elements, ",{number}").unwrap();
+        }
+        elements.push('\n');
+    }
+    let deck = text
+        + &elements
+        + LAW
+        + "*BOUNDARY\n1,2\n*STEP\n*STATIC\n*DLOAD\nALL,CENTRIF,5.,0.,0.,0.,0.,1.,0.\n*END STEP\n";
+    let solved = solve(&deck);
+    // Displacement of the bore: a σ_θ / E, since its face is free.
+    let expected = 3.0 * 5.0 * (3.3 * 4.0 + 0.7) / 4.0 / 200.0;
+    near(solved[0].displacements[0].x / expected, 1.0, 1e-3);
+}
+
+#[test]
+fn all_that_is_not_computed_is_named_at_once() {
+    let deck = "*NODE\n1,0,0\n*ELEMENT,TYPE=F3D8,ELSET=ALL\n1,1\n*MATERIAL,NAME=M\n*PLASTIC\n1,2\n*STEP\n*FREQUENCY\n3\n*END STEP\n";
+    let line = refusal(deck);
+    for part in ["deck.inp:3: elements of type \"F3D8\"", "line 6: *PLASTIC", "line 9: *FREQUENCY"]
+    {
+        assert!(line.contains(part), "{line}");
+    }
+}
+
+#[test]
+fn faults_are_named_with_their_lines() {
+    let mut body = Body::default();
+    body.fill("C3D20", UNIT, [1, 1, 1]);
+    let good =
+        body.text("C3D20") + LAW + &body.corner() + "*STEP\n*STATIC\n*CLOAD\n3,1,1.\n*END STEP\n";
+    assert!(parse(good.as_bytes(), Path::new("deck.inp"), Units::MetreNewton).is_ok());
+    let line = refusal(&good.replace("3,1,1.\n", "99,1,1.\n3,7,1.\n"));
+    // A card ends at its first fault; the next card is read all the same.
+    assert!(line.contains("node 99 is not defined"), "{line}");
+    let line = refusal(&good.replace("200.,.3", "200.,.6").replace("*DENSITY\n3.", "*DENSITY\nx"));
+    assert!(line.contains("Poisson") && line.contains("\"x\" is not a number"), "{line}");
+    assert!(refusal(&good.replace("*END STEP\n", "")).contains("without *END STEP"));
+    assert!(refusal(&good.replace("*STEP\n", "*STEP,NLGEOM\n")).contains("large displacements"));
+    let two = "*EQUATION\n1\n3,1,1.\n*EQUATION\n1\n3,1,2.\n";
+    let moved = good.replace("*BOUNDARY", &format!("{two}*BOUNDARY"));
+    assert!(parse(moved.as_bytes(), Path::new("deck.inp"), Units::MetreNewton).is_ok());
+    let free = good.replace(&body.corner(), "*BOUNDARY\n1,1\n");
+    let deck = parse(free.as_bytes(), Path::new("deck.inp"), Units::MetreNewton).unwrap();
+    let why = deck.solve(&Job::default()).unwrap_err().to_string();
+    assert!(why.contains("can move freely"), "{why}");
+}
