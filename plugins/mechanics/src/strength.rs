@@ -124,7 +124,7 @@ const PEAK_WORK: [f64; 2] = [0.3, 3e6];
 const STEPS: usize = 400;
 /// For so many steps it must not have risen.
 const FALLING: usize = 3;
-/// The same share where only the peak is wanted.
+/// Share of the peak below which it is past that.
 const PASSED: f64 = 0.97;
 /// It is followed no further than so many times the displacement at the first yielding: until it
 /// fails, and where only the peak is wanted (what comes after that is the hardening of bars).
@@ -424,14 +424,12 @@ impl<'a, 'm> Watch<'a, 'm> {
             Reach::Peak => (if waits { SPENT } else { PASSED }, DUCTILE[1]),
             Reach::Failure => (SPENT, DUCTILE[0]),
         };
-        if self.has_fallen(&now, spent) && self.is_falling() {
+        let is_far = moved > BEYOND * peak.displacement_m.abs();
+        if self.has_fallen(&now, spent) && self.is_falling() && (is_far || !waits) {
             return Some(format!("the load has fallen below {spent} of its peak"));
         }
-        if moved > BEYOND * peak.displacement_m.abs()
-            && self.yielding.is_none()
-            && !waits
-            && now.load_factor < 0.97 * peak.load_factor
-        {
+        let has_turned = now.load_factor < PASSED * peak.load_factor;
+        if is_far && has_turned && self.yielding.is_none() && !waits {
             return Some(format!("it has moved {BEYOND} times as far as at its peak"));
         }
         if let Along::Displacement(Some(to)) = self.raised.along

@@ -381,6 +381,13 @@ impl Reader {
             |u| held.contains(&u),
             card.line,
         );
+        let loose = loose.map_err(|(node, off)| {
+            let label = self.deck.labels.get(node as usize).copied().unwrap_or_default();
+            card.fault(format!(
+                "node {label} is {:.3e} off {master}: a tie across a gap is not computed, let the surfaces meet",
+                off / self.units.length()
+            ))
+        })?;
         if let Some(first) = loose.first().and_then(|&n| self.deck.labels.get(n as usize)) {
             self.deck.notes.push(format!(
                 "line {}: {} of {} nodes lie on no face of {master} and stay free, node {first} the first",
