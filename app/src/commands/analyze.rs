@@ -340,7 +340,7 @@ enum Read {
     /// Bricks, shells and bars, as members have them.
     Members(Work),
     /// Any solids, linear elastic.
-    Linear(linear::Read),
+    Linear(Box<linear::Read>),
 }
 
 /// A deck of another program.
@@ -368,7 +368,7 @@ fn deck(args: &args::Analyze, kind: &str) -> Result<Read, Failure> {
     let deck = if kind == "inp" {
         if concerns(&bytes) {
             let deck = intrados_mechanics::linear::parse(&bytes, path, units)?;
-            return Ok(Read::Linear(linear::Read { deck, name, hash }));
+            return Ok(Read::Linear(Box::new(linear::Read { deck, name, hash })));
         }
         read::abaqus::parse(&bytes, path, units)?
     } else {

@@ -76,7 +76,7 @@ impl Reader {
             "DENSITY" => {
                 card.only(&[])?;
                 let [density] = counted(card, &numbers, &[1])? else { return Ok(()) };
-                if !(*density >= 0.0) {
+                if !density.is_finite() || *density < 0.0 {
                     return Err(card.fault(format!("density must not be below 0, not {density}")));
                 }
                 material.density = density * self.units.density();
@@ -187,7 +187,7 @@ impl Reader {
         let elements = self.element_sets.get(&set).ok_or_else(|| missing("element set", &set))?;
         for &element in elements {
             let raw = &mut self.raw[element as usize];
-            if matches!(raw.kind, Kind::Flat(_)) && !(thickness > 0.0) {
+            if matches!(raw.kind, Kind::Flat(_)) && (thickness.is_nan() || thickness <= 0.0) {
                 return Err(card.fault(format!("thickness of {set} must be above 0")));
             }
             raw.section = Some(Section { material, orientation, thickness });
@@ -265,10 +265,9 @@ fn orthotropic(n: &[f64]) -> Tangent {
 fn anisotropic(n: &[f64]) -> Tangent {
     let mut law = [[0.0; 6]; 6];
     let mut values = n.iter();
-    for j in 0..6 {
-        for i in 0..=j {
+    for (column, &b) in ORDER.iter().enumerate() {
+        for &a in &ORDER[..=column] {
             let value = values.next().copied().unwrap_or(0.0);
-            let (a, b) = (ORDER[i], ORDER[j]);
             (law[a][b], law[b][a]) = (value, value);
         }
     }

@@ -51,7 +51,9 @@ impl Add for Jet {
 impl Mul for Jet {
     type Output = Self;
     fn mul(self, other: Self) -> Self {
-        let slope = |i: usize| self.slope[i] * other.value + self.value * other.slope[i];
+        // By the product rule.
+        let slope =
+            |i: usize| [self.slope[i] * other.value, self.value * other.slope[i]].iter().sum();
         Self { value: self.value * other.value, slope: std::array::from_fn(slope) }
     }
 }

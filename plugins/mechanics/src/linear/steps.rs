@@ -420,7 +420,7 @@ fn timing(card: &Card<'_>, state: &mut State) -> Result<(), Fault> {
     let Some(row) = card.one_row()? else { return Ok(()) };
     let duration = row.fields().nth(1).filter(|w| !w.is_empty()).map(|w| row.number(w));
     if let (Some(duration), Some(open)) = (duration.transpose()?, &mut state.open) {
-        if !(duration > 0.0) {
+        if duration.is_nan() || duration <= 0.0 {
             return Err(row.fault(format!("a duration of {duration} s")));
         }
         open.2 = duration;

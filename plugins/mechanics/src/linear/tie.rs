@@ -47,7 +47,7 @@ impl Face {
 
     /// Its point nearest to a place.
     fn foot(&self, deck: &Deck, place: DVec3) -> Foot {
-        let triangle = self.nodes.len() % 3 == 0;
+        let triangle = self.nodes.len().is_multiple_of(3);
         let mut at = if triangle { [1.0 / 3.0; 2] } else { [0.0; 2] };
         for _ in 0..STEPS {
             let (point, [a, b]) = self.tangents(deck, at);
@@ -60,7 +60,7 @@ impl Face {
             let next = within(triangle, [at[0] + step[0], at[1] + step[1]]);
             let moved = (next[0] - at[0]).abs() + (next[1] - at[1]).abs();
             at = next;
-            if !(moved > 1e-14) {
+            if moved.is_nan() || moved <= 1e-14 {
                 break;
             }
         }
