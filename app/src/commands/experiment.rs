@@ -3,8 +3,8 @@
 use intrados_experiments::{
     apart::{Paired, Worth, corrections},
     calibration::{Calibration, calibration},
-    case::{Case, Cases},
-    table::{Row, Table, judge},
+    case::{CaseSet, ExperimentCase},
+    table::{CaseRow, CaseTable, judge},
 };
 
 use serde::Serialize;
@@ -92,14 +92,15 @@ fn coverages(found: &Calibration) -> String {
 }
 
 fn table_3_1(session: &Session, args: &args::Experiment) -> Result<Outcome, Failure> {
-    let mut cases = Cases::twenty()?;
+    let mut cases = CaseSet::twenty()?;
     if let Some(number) = args.rehearsal {
         cases = cases.rehearsal(number);
     }
     may_keep(args, if args.corrections { "corrections.json" } else { "table-3-1.json" })?;
     let [first, last] = args.cases.0;
     let progress = session.watch("twenty cases");
-    let chosen: Vec<Case> = cases.cases.iter().take(last).skip(first - 1).cloned().collect();
+    let chosen: Vec<ExperimentCase> =
+        cases.cases.iter().take(last).skip(first - 1).cloned().collect();
     if args.corrections {
         let worths = Corrections {
             schema: "intrados.experiment.corrections/2",
@@ -112,7 +113,7 @@ fn table_3_1(session: &Session, args: &args::Experiment) -> Result<Outcome, Fail
     }
     let key = (args.rehearsal, args.ablations);
     let table = match &args.out {
-        None => Table::of(
+        None => CaseTable::of(
             chosen
                 .iter()
                 .map(|case| Ok(judge(case, &cases, args.ablations, &session.job)?.row))
@@ -120,7 +121,7 @@ fn table_3_1(session: &Session, args: &args::Experiment) -> Result<Outcome, Fail
         ),
         Some(out) => {
             let (files, rows) = output::in_parts(session, out, &key, |files| {
-                let row = |case: &Case| {
+                let row = |case: &ExperimentCase| {
                     files.part(&case.id, |files| {
                         let judged = judge(case, &cases, args.ablations, &session.job)?;
                         if let Some(png) = judged.picture() {
@@ -131,7 +132,7 @@ fn table_3_1(session: &Session, args: &args::Experiment) -> Result<Outcome, Fail
                 };
                 chosen.iter().map(row).collect::<Result<Vec<_>, Failure>>()
             })?;
-            let table = Table::of(rows);
+            let table = CaseTable::of(rows);
             files.finish("table-3-1.json", &table)?;
             table
         }
@@ -173,7 +174,7 @@ impl Corrections {
     }
 }
 
-fn text(table: &Table) -> String {
+fn text(table: &CaseTable) -> String {
     let heads = [
         "case",
         "kind",
@@ -225,7 +226,7 @@ fn text(table: &Table) -> String {
     )
 }
 
-fn row(r: &Row) -> Vec<String> {
+fn row(r: &CaseRow) -> Vec<String> {
     let interval = |[low, high]: [f64; 2]| format!("{low:.1}–{high:.1}");
     vec![
         r.id.clone(),

@@ -7,19 +7,19 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     ExperimentError,
-    case::{Case, Cases},
+    case::{CaseSet, ExperimentCase},
     correct::{Care, STEERED, corrected_by, plain, scattered},
     ours::{self, Choice},
-    reference::{Marks, otsu, sauvola, strongest},
+    reference::{MethodMarks, otsu, sauvola, strongest},
     scan::{Made, make},
-    scatter::Effort,
+    scatter::ScatterEffort,
     score::scored,
 };
 use intrados_ct::{crack, detect::DetectSettings, network::Network, slice::Slice};
 use intrados_raster::grid::{Grid, Mask};
 
 /// Plain walks that take as long as learning and steered walks do.
-const UNSTEERED: Effort = Effort { walks: 5 << 15, steered: false, ..STEERED };
+const UNSTEERED: ScatterEffort = ScatterEffort { walks: 5 << 15, steered: false, ..STEERED };
 
 /// Scores of ours with a part left out.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -48,13 +48,13 @@ fn judged(slice: &Slice, made: &Made, seed: u64, job: &Job) -> Result<f64, Exper
 
 /// Ablations of one case, `full` its corrected slice.
 pub(super) fn ablations(
-    case: &Case,
+    case: &ExperimentCase,
     made: &Made,
     full: &Slice,
     job: &Job,
 ) -> Result<Ablations, ExperimentError> {
     job.relabel(format!("{}: ablations", case.id));
-    let timed = |effort: Effort| {
+    let timed = |effort: ScatterEffort| {
         let begin = cpu_seconds();
         scattered(&made.scan, effort, job).map(|s| (s, cpu_seconds() - begin))
     };
@@ -73,7 +73,7 @@ pub(super) fn ablations(
 }
 
 /// The strong reference's pores, and cracks by its rule and by the ridge filter.
-fn ridges(slice: &Slice) -> Marks {
+fn ridges(slice: &Slice) -> MethodMarks {
     let mut marks = sauvola(slice, &strongest());
     let otsu = super::reference::otsu_threshold(&slice.grey);
     let body = super::reference::body(&slice.grey, otsu);
@@ -149,8 +149,8 @@ impl Paired {
 /// # Errors
 /// Cancelled, or the program's tables are damaged.
 pub fn corrections(
-    chosen: &[Case],
-    cases: &Cases,
+    chosen: &[ExperimentCase],
+    cases: &CaseSet,
     job: &Job,
 ) -> Result<Vec<Worth>, ExperimentError> {
     let all = Corrections::ALL;

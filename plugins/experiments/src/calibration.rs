@@ -55,25 +55,25 @@ pub struct Calibration {
     pub plantings: usize,
     /// By the declared odds.
     #[serde(flatten)]
-    pub declared: Set,
+    pub declared: OddsSet,
     /// By other odds.
-    pub clustered: Set,
+    pub clustered: OddsSet,
 }
 
 /// Error bars of members, of zones and of porosities, each by themselves, under one kind of odds.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Set {
+pub struct OddsSet {
     /// By what odds damage was planted.
     pub odds: Odds,
     /// Coverage of members, zones and slices, each with its n, and all other scores.
     pub score: MemberScore,
     /// The members, planting by planting.
-    pub members: Vec<Judged>,
+    pub members: Vec<JudgedMember>,
 }
 
 /// What was said of one member under one planting.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Judged {
+pub struct JudgedMember {
     /// Name of the scene.
     pub scene: String,
     /// Number of the planting, from 1.
@@ -88,7 +88,7 @@ pub struct Judged {
     pub truth: f64,
 }
 
-impl Judged {
+impl JudgedMember {
     fn of(scene: &Scene, planting: usize, member: &MemberPrediction) -> Option<Self> {
         let (damage, std_error, truth) =
             (member.damage?, member.damage_std_error?, member.truth.as_ref()?.damage);
@@ -106,7 +106,7 @@ impl Judged {
 /// What came of one planting: all that figures are made of.
 #[derive(Serialize, Deserialize)]
 struct Planting {
-    judged: Vec<Judged>,
+    judged: Vec<JudgedMember>,
     compared: Compared,
 }
 
@@ -148,7 +148,8 @@ pub fn calibration(
                     predictor.learn_lives(lives.clone());
                     while predictor.advance(&planted, &job)? {}
                     let found = predictor.finish(&planted).members;
-                    let judged = found.iter().filter_map(|m| Judged::of(scene, 1 + k, m)).collect();
+                    let judged =
+                        found.iter().filter_map(|m| JudgedMember::of(scene, 1 + k, m)).collect();
                     Ok(Planting { judged, compared: Compared::of(&found) })
                 };
                 let Planting { judged, compared } = match parts.as_deref_mut() {
@@ -164,7 +165,7 @@ pub fn calibration(
     }
     let [declared, clustered] =
         sets.map(|(compared, judged)| (compared.score(&settings.profile), judged));
-    let set = |odds, (score, members)| Set { odds, score, members };
+    let set = |odds, (score, members)| OddsSet { odds, score, members };
     let [declared, clustered] = [set(Odds::Declared, declared), set(Odds::Clustered, clustered)];
     Ok(Calibration {
         schema: SCHEMA,

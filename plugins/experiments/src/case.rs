@@ -14,7 +14,7 @@ const SCHEMA: &str = "intrados.cases/1";
 /// All cases and what they share.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Cases {
+pub struct CaseSet {
     /// `intrados.cases/1`.
     pub schema: String,
     /// Every case's photons are multiplied by this: the one number by which the plain reference was
@@ -25,7 +25,7 @@ pub struct Cases {
     /// Voxels that the panel sees across.
     pub across: usize,
     /// In their order.
-    pub cases: Vec<Case>,
+    pub cases: Vec<ExperimentCase>,
 }
 
 /// What is scanned.
@@ -102,7 +102,7 @@ pub struct Cracks {
 /// One member, its damage, its scan.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Case {
+pub struct ExperimentCase {
     /// What it is called.
     pub id: String,
     /// What it is.
@@ -123,7 +123,7 @@ pub struct Case {
     pub copper_mm: f64,
     /// Height of the beam at the axis, mm: the higher, the more scatter.
     pub beam_mm: f64,
-    /// Thousands of photons that the open beam brings to a pixel in a view, before [`Cases::dose`].
+    /// Thousands of photons that the open beam brings to a pixel in a view, before [`CaseSet::dose`].
     pub photons: f64,
     /// Of all that is by chance.
     pub seed: u64,
@@ -138,7 +138,7 @@ pub struct Rod {
     pub radius: f64,
 }
 
-impl Cases {
+impl CaseSet {
     /// The twenty cases.
     ///
     /// # Errors
@@ -166,7 +166,7 @@ impl Cases {
     }
 }
 
-impl Case {
+impl ExperimentCase {
     /// Across the axis, m.
     #[must_use]
     pub(crate) fn outline(&self) -> Outline {
@@ -240,8 +240,8 @@ mod tests {
 
     #[test]
     fn there_are_ten_columns_and_ten_beams() {
-        let cases = Cases::twenty().unwrap().cases;
-        let count = |of: &dyn Fn(&Case) -> bool| cases.iter().filter(|c| of(c)).count();
+        let cases = CaseSet::twenty().unwrap().cases;
+        let count = |of: &dyn Fn(&ExperimentCase) -> bool| cases.iter().filter(|c| of(c)).count();
         assert_eq!(
             [count(&|c| c.kind == Kind::Column), count(&|c| c.kind == Kind::Beam)],
             [10, 10]
@@ -266,7 +266,7 @@ mod tests {
         seeds.sort_unstable();
         seeds.dedup();
         assert_eq!(seeds.len(), 20);
-        let again = Cases::twenty().unwrap().rehearsal(0);
+        let again = CaseSet::twenty().unwrap().rehearsal(0);
         assert!(
             again
                 .cases

@@ -14,8 +14,8 @@ use glam::DVec2;
 
 use super::{
     ExperimentError,
-    scan::{Scan, Sheet, standard},
-    scatter::{Effort, Head, Scatter},
+    scan::{RawScan, Sheet, standard},
+    scatter::{Head, Scatter, ScatterEffort},
 };
 use intrados_ct::slice::Slice;
 use intrados_raster::grid::{Grid, Mask};
@@ -28,8 +28,8 @@ const OFF: f64 = 2.0;
 const BARS: usize = 24;
 
 /// How the scatter of the correction is found: six views of sixteen patches.
-pub(crate) const STEERED: Effort =
-    Effort { views: 6, columns: 16, walks: 1 << 15, links: 8, steered: true };
+pub(crate) const STEERED: ScatterEffort =
+    ScatterEffort { views: 6, columns: 16, walks: 1 << 15, links: 8, steered: true };
 
 /// What may be left out of a correction.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,7 +37,7 @@ pub struct Care {
     /// Which corrections are made.
     pub corrections: Corrections,
     /// How scatter is found.
-    pub effort: Effort,
+    pub effort: ScatterEffort,
     /// Of the backprojection.
     pub window: Window,
 }
@@ -50,8 +50,8 @@ impl Care {
 
 /// Transmission after dark and flat field; readings of pixels that do not follow the beam come from
 /// their neighbours.
-fn transmission(scan: &Scan) -> Vec<f32> {
-    let Scan { panel, frames, sheet } = scan;
+fn transmission(scan: &RawScan) -> Vec<f32> {
+    let RawScan { panel, frames, sheet } = scan;
     let bad = bad_pixels(panel, 8.0);
     let bins = sheet.orbit.bins();
     let mut values: Vec<f32> = frames
@@ -86,7 +86,7 @@ fn picture(volume: volume::Volume, sheet: &Sheet, name: &str) -> Slice {
 }
 
 /// Line integrals as they are.
-fn lines(scan: &Scan) -> Sinogram {
+fn lines(scan: &RawScan) -> Sinogram {
     let floor = (0.5 / scan.sheet.open) as f32;
     Sinogram {
         orbit: scan.sheet.orbit.clone(),
@@ -98,7 +98,7 @@ fn lines(scan: &Scan) -> Sinogram {
 ///
 /// # Errors
 /// Cancelled.
-pub(crate) fn plain(scan: &Scan, job: &Job) -> Result<Slice, ExperimentError> {
+pub(crate) fn plain(scan: &RawScan, job: &Job) -> Result<Slice, ExperimentError> {
     Ok(picture(
         fbp(&lines(scan), &scan.sheet.slice, Window::SheppLogan, job)?,
         &scan.sheet,
@@ -112,8 +112,8 @@ pub(crate) fn plain(scan: &Scan, job: &Job) -> Result<Slice, ExperimentError> {
 /// # Errors
 /// Cancelled.
 pub(crate) fn scattered(
-    scan: &Scan,
-    effort: Effort,
+    scan: &RawScan,
+    effort: ScatterEffort,
     job: &Job,
 ) -> Result<Scatter, ExperimentError> {
     let sheet = &scan.sheet;
@@ -128,7 +128,7 @@ pub(crate) fn scattered(
 ///
 /// # Errors
 /// Cancelled.
-pub(crate) fn corrected(scan: &Scan, care: Care, job: &Job) -> Result<Slice, ExperimentError> {
+pub(crate) fn corrected(scan: &RawScan, care: Care, job: &Job) -> Result<Slice, ExperimentError> {
     let scatter =
         if care.corrections.scatter { Some(scattered(scan, care.effort, job)?) } else { None };
     corrected_by(scan, care, scatter.as_ref(), job)
@@ -139,7 +139,7 @@ pub(crate) fn corrected(scan: &Scan, care: Care, job: &Job) -> Result<Slice, Exp
 /// # Errors
 /// Cancelled.
 pub(crate) fn corrected_by(
-    scan: &Scan,
+    scan: &RawScan,
     care: Care,
     scatter: Option<&Scatter>,
     job: &Job,

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     ExperimentError,
-    reference::{self, Marks},
+    reference::{self, MethodMarks},
 };
 use intrados_ct::{
     crack, detect,
@@ -60,7 +60,7 @@ pub(crate) fn found(
     network: &Network,
     choice: &Choice,
     job: &Job,
-) -> Result<Marks, ExperimentError> {
+) -> Result<MethodMarks, ExperimentError> {
     let settings = detect::DetectSettings::default();
     let Some(mut normal) = normalised(slice, &settings, job)? else { return Ok(nothing(slice)) };
     // The same body as the references': what the rim shows is blur.
@@ -104,7 +104,7 @@ pub(crate) fn found(
     }
     let mut pores = dark.map(|_| false);
     objects.iter().flatten().for_each(|i| pores.data[*i] = true);
-    Ok(Marks { pores, objects, cracks })
+    Ok(MethodMarks { pores, objects, cracks })
 }
 
 fn cracks(
@@ -124,7 +124,7 @@ fn cracks(
     crack::find_likely(chance, &normal.grey, body, 1.0, slice.pixel_mm, &settings).mask
 }
 
-fn nothing(slice: &Slice) -> Marks {
+fn nothing(slice: &Slice) -> MethodMarks {
     let empty = slice.grey.map(|_| false);
-    Marks { pores: empty.clone(), objects: Vec::new(), cracks: empty }
+    MethodMarks { pores: empty.clone(), objects: Vec::new(), cracks: empty }
 }

@@ -19,7 +19,7 @@ const BINS: usize = 256;
 
 /// What a method says of a slice.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Marks {
+pub struct MethodMarks {
     /// Pores.
     pub pores: Mask,
     /// Numbers of the pores from 1, where a method splits what touches; else by 4-connection.
@@ -30,7 +30,7 @@ pub struct Marks {
 
 /// Otsu's threshold over the slice, connected components (Otsu 1979).
 #[must_use]
-pub fn otsu(slice: &Slice) -> Marks {
+pub fn otsu(slice: &Slice) -> MethodMarks {
     let threshold = otsu_threshold(&slice.grey);
     let body = body(&slice.grey, threshold);
     let dark = Mask {
@@ -43,7 +43,7 @@ pub fn otsu(slice: &Slice) -> Marks {
 /// Sauvola's threshold in a window of `window` pixels with the k and r of `settings`, connected
 /// components, the pores among them split by a watershed of the distance map.
 #[must_use]
-pub(crate) fn sauvola(slice: &Slice, settings: &DetectSettings) -> Marks {
+pub(crate) fn sauvola(slice: &Slice, settings: &DetectSettings) -> MethodMarks {
     let otsu = otsu_threshold(&slice.grey);
     let body = body(&slice.grey, otsu);
     let matrix =
@@ -71,7 +71,7 @@ pub(crate) fn strongest() -> DetectSettings {
     DetectSettings { window: 41, k: 0.8, split: Some(1.0), ..DetectSettings::default() }
 }
 
-fn told(dark: &Mask, split: Option<f32>) -> Marks {
+fn told(dark: &Mask, split: Option<f32>) -> MethodMarks {
     let mut components = dark.components();
     let mut cracks = dark.map(|_| false);
     components.members.retain(|pixels| {
@@ -91,7 +91,7 @@ fn told(dark: &Mask, split: Option<f32>) -> Marks {
         Some(height) => detect::split(&components, height),
         None => components.members,
     };
-    Marks { pores, objects, cracks }
+    MethodMarks { pores, objects, cracks }
 }
 
 /// Half way in the sense of Otsu between what is dark and what is bright, over the whole field;

@@ -24,9 +24,9 @@ use intrados_xray::{
 
 use super::{
     ExperimentError,
-    case::{Case, Cases, Grains},
-    scatter::{Effort, Head, Scatter},
-    shapes::{Bodies, Truth},
+    case::{CaseSet, ExperimentCase, Grains},
+    scatter::{Head, Scatter, ScatterEffort},
+    shapes::{Bodies, PlantedTruth},
 };
 use intrados_raster::grid::Grid as Picture;
 
@@ -44,7 +44,8 @@ const LAYERS: usize = 4;
 /// Field of the panel over the specimen's largest width.
 const FIELD: f64 = 1.05;
 /// How the true scatter is found.
-const EFFORT: Effort = Effort { views: 6, columns: 20, walks: 1 << 16, links: 4, steered: false };
+const EFFORT: ScatterEffort =
+    ScatterEffort { views: 6, columns: 20, walks: 1 << 16, links: 4, steered: false };
 /// Edge of the cells that scatter, across and along the axis, m.
 const CELL: [f64; 2] = [2.5e-3, 20e-3];
 /// How far beyond the beam photons wander and come back, m.
@@ -78,7 +79,7 @@ pub struct Sheet {
 
 /// A scan as it comes from the scanner.
 #[derive(Debug, Clone)]
-pub struct Scan {
+pub struct RawScan {
     /// What is known of it.
     pub sheet: Sheet,
     /// Raw readings `[view][bin]`.
@@ -91,9 +92,9 @@ pub struct Scan {
 #[derive(Debug, Clone)]
 pub struct Made {
     /// What the methods get.
-    pub scan: Scan,
+    pub scan: RawScan,
     /// What they are judged by.
-    pub truth: Truth,
+    pub truth: PlantedTruth,
     /// True attenuation of the slice's pixels at the energy of corrected slices, 1/m.
     pub attenuation: Picture<f32>,
     /// Scatter over primary behind the middle of the member.
@@ -105,7 +106,7 @@ pub struct Made {
 }
 
 impl Sheet {
-    fn of(case: &Case, cases: &Cases) -> Self {
+    fn of(case: &ExperimentCase, cases: &CaseSet) -> Self {
         let outline = case.outline();
         let voxel = 2.0 * outline.reach() * FIELD / cases.across as f64;
         let pixel = voxel * (SOURCE + BEHIND) / SOURCE;
@@ -154,7 +155,7 @@ struct Reality {
 }
 
 impl Reality {
-    fn of(case: &Case, sheet: &Sheet) -> Self {
+    fn of(case: &ExperimentCase, sheet: &Sheet) -> Self {
         let key = Key::new(case.seed, 7);
         let off = |d: u32| 2.0 * key.unit64(d) - 1.0;
         Self {
@@ -187,7 +188,7 @@ impl Reality {
 pub struct Cast {
     sheet: Sheet,
     painted: Painted,
-    truth: Truth,
+    truth: PlantedTruth,
     real: Reality,
     spectrum: Spectrum,
     response: Response,
@@ -200,7 +201,11 @@ pub struct Cast {
 ///
 /// # Errors
 /// Cancelled, or the program's tables are damaged.
-pub(crate) fn make(case: &Case, cases: &Cases, job: &Job) -> Result<Made, ExperimentError> {
+pub(crate) fn make(
+    case: &ExperimentCase,
+    cases: &CaseSet,
+    job: &Job,
+) -> Result<Made, ExperimentError> {
     cast(case, cases, job)?.exposed(case, job)
 }
 
@@ -208,7 +213,11 @@ pub(crate) fn make(case: &Case, cases: &Cases, job: &Job) -> Result<Made, Experi
 ///
 /// # Errors
 /// Cancelled, or the program's tables are damaged.
-pub(crate) fn cast(case: &Case, cases: &Cases, job: &Job) -> Result<Cast, ExperimentError> {
+pub(crate) fn cast(
+    case: &ExperimentCase,
+    cases: &CaseSet,
+    job: &Job,
+) -> Result<Cast, ExperimentError> {
     let sheet = Sheet::of(case, cases);
     let edge = sheet.voxel() / FINE as f64;
     let [nx, ny, _] = sheet.slice.size;
@@ -216,7 +225,7 @@ pub(crate) fn cast(case: &Case, cases: &Cases, job: &Job) -> Result<Cast, Experi
     job.relabel(format!("{}: casting", case.id));
     let bodies = Bodies::grow(case, 0.5 * edge * LAYERS as f64);
     let (painted, voids) = bodies.paint(case, &grid, job)?;
-    let truth = Truth::of(&painted, &voids, FINE);
+    let truth = PlantedTruth::of(&painted, &voids, FINE);
     let real = Reality::of(case, &sheet);
     let (spectrum, response) = real.tube.radiation()?;
     let rock = match case.grains {
@@ -242,7 +251,7 @@ impl Cast {
     ///
     /// # Errors
     /// Cancelled, or the program's tables are damaged.
-    pub(crate) fn exposed(self, case: &Case, job: &Job) -> Result<Made, ExperimentError> {
+    pub(crate) fn exposed(self, case: &ExperimentCase, job: &Job) -> Result<Made, ExperimentError> {
         let Self { sheet, painted, truth, real, spectrum, response, rock, scatter } = self;
         job.relabel(format!("{}: exposing", case.id));
         let detector = Detector { blur: 0.35 * FINE as f64, ..Detector::default() };
@@ -299,7 +308,7 @@ impl Cast {
             flat: binned(&exposure.panel.flat),
         };
         Ok(Made {
-            scan: Scan { frames: binned(&exposure.frames), panel, sheet },
+            scan: RawScan { frames: binned(&exposure.frames), panel, sheet },
             truth,
             attenuation,
             scatter_to_primary: to_primary,
@@ -420,8 +429,8 @@ mod tests {
         score::scored,
     };
 
-    fn tiny() -> (Case, Cases) {
-        let case = Case {
+    fn tiny() -> (ExperimentCase, CaseSet) {
+        let case = ExperimentCase {
             id: "tiny".into(),
             kind: Kind::Beam,
             section: Section::Rectangle(40.0, 30.0),
@@ -437,7 +446,7 @@ mod tests {
         };
         (
             case.clone(),
-            Cases { schema: String::new(), dose: 1.0, views: 90, across: 72, cases: vec![case] },
+            CaseSet { schema: String::new(), dose: 1.0, views: 90, across: 72, cases: vec![case] },
         )
     }
 

@@ -38,7 +38,7 @@ pub(super) struct Head {
 
 /// How much is done for it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Effort {
+pub struct ScatterEffort {
     /// Views of a turn.
     pub views: usize,
     /// Columns of the strip.
@@ -78,7 +78,7 @@ impl Head {
     pub(super) fn scatter(
         &self,
         specimen: &Specimen,
-        effort: Effort,
+        effort: ScatterEffort,
         seed: u64,
         job: &Job,
     ) -> Result<Scatter, ExperimentError> {

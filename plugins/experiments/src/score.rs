@@ -11,7 +11,7 @@
 use intrados_stage::random::Key;
 use serde::{Deserialize, Serialize};
 
-use super::{reference::Marks, shapes::Truth};
+use super::{reference::MethodMarks, shapes::PlantedTruth};
 use intrados_ct::score::MIN_OBJECT;
 use intrados_raster::grid::{Grid, Mask};
 
@@ -24,7 +24,7 @@ const DRAWS: u64 = 1000;
 
 /// What a score is made of; that of several blocks adds up.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Counts {
+pub struct ScoreCounts {
     /// Objects matched, found, true.
     objects: [f64; 3],
     /// Pixels of pores found, true.
@@ -47,7 +47,7 @@ pub struct Terms {
 /// A score with its 95 % interval: a bootstrap over blocks of the slice, which keeps neighbouring
 /// objects together (Künsch 1989).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Scored {
+pub struct IntervalScore {
     /// 0 to 100.
     pub score: f64,
     /// 95 % interval.
@@ -56,7 +56,7 @@ pub struct Scored {
     pub terms: Terms,
 }
 
-impl Counts {
+impl ScoreCounts {
     fn add(&mut self, other: &Self) {
         (0..3).for_each(|k| self.objects[k] += other.objects[k]);
         (0..2).for_each(|k| self.area[k] += other.area[k]);
@@ -99,11 +99,11 @@ impl Terms {
 
 /// Scores marks against the truth.
 #[must_use]
-pub(crate) fn scored(marks: &Marks, truth: &Truth, seed: u64) -> Scored {
+pub(crate) fn scored(marks: &MethodMarks, truth: &PlantedTruth, seed: u64) -> IntervalScore {
     let blocks = blocks(marks, truth);
     let (pores, cracks) = (truth.pores.data.contains(&true), truth.cracks.data.contains(&true));
-    let sum = |blocks: &mut dyn Iterator<Item = &Counts>| {
-        let mut sum = Counts::default();
+    let sum = |blocks: &mut dyn Iterator<Item = &ScoreCounts>| {
+        let mut sum = ScoreCounts::default();
         blocks.for_each(|b| sum.add(b));
         sum
     };
@@ -117,14 +117,14 @@ pub(crate) fn scored(marks: &Marks, truth: &Truth, seed: u64) -> Scored {
     let mut draws: Vec<f64> = (0..DRAWS).map(draw).collect();
     draws.sort_by(f64::total_cmp);
     let at = |q: f64| draws[((q * draws.len() as f64) as usize).min(draws.len() - 1)];
-    Scored { score: terms.score(), ci95: [at(0.025), at(0.975)], terms }
+    IntervalScore { score: terms.score(), ci95: [at(0.025), at(0.975)], terms }
 }
 
 /// Counts of every block in which there is something of the body.
-fn blocks(marks: &Marks, truth: &Truth) -> Vec<Counts> {
+fn blocks(marks: &MethodMarks, truth: &PlantedTruth) -> Vec<ScoreCounts> {
     let width = truth.pores.width;
     let across = width.div_ceil(BLOCK);
-    let mut blocks = vec![Counts::default(); across * truth.pores.height.div_ceil(BLOCK)];
+    let mut blocks = vec![ScoreCounts::default(); across * truth.pores.height.div_ceil(BLOCK)];
     let block = |i: usize| i / width / BLOCK * across + i % width / BLOCK;
     let is_object = |pixels: &&Vec<usize>| pixels.len() >= MIN_OBJECT;
     let found: Vec<&Vec<usize>> = marks.objects.iter().filter(is_object).collect();
@@ -173,7 +173,7 @@ fn blocks(marks: &Marks, truth: &Truth) -> Vec<Counts> {
     blocks
         .into_iter()
         .zip(is_body)
-        .filter(|(counts, body)| *body || *counts != Counts::default())
+        .filter(|(counts, body)| *body || *counts != ScoreCounts::default())
         .map(|(counts, _)| counts)
         .collect()
 }
@@ -191,13 +191,13 @@ mod tests {
         }
     }
 
-    fn marks(rows: &[&str]) -> Marks {
+    fn marks(rows: &[&str]) -> MethodMarks {
         let pores = drawn(rows, b'o');
-        Marks { objects: pores.components().members, pores, cracks: drawn(rows, b'#') }
+        MethodMarks { objects: pores.components().members, pores, cracks: drawn(rows, b'#') }
     }
 
-    fn truth(rows: &[&str]) -> Truth {
-        Truth {
+    fn truth(rows: &[&str]) -> PlantedTruth {
+        PlantedTruth {
             pores: drawn(rows, b'o'),
             cracks: drawn(rows, b'#'),
             body: drawn(rows, b' ').map(|v| !v),

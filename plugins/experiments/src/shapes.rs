@@ -20,7 +20,7 @@ use intrados_xray::{
 };
 use rayon::prelude::*;
 
-use super::case::{Case, Cracks, Grains, Pores, Rod};
+use super::case::{Cracks, ExperimentCase, Grains, Pores, Rod};
 use intrados_raster::grid::{Grid as Picture, Mask};
 
 /// Share of the volume that grains large enough to be drawn have.
@@ -108,7 +108,7 @@ pub struct Bodies {
 
 /// What is true on the pixels that the methods see.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Truth {
+pub struct PlantedTruth {
     /// Half or more of the pixel's volume lies in pores.
     pub pores: Mask,
     /// A quarter or more lies in a crack, and it is no pore.
@@ -122,7 +122,7 @@ pub struct Truth {
 impl Bodies {
     /// All of them within `high` above and below the scan plane, by the case's seed.
     #[must_use]
-    pub(crate) fn grow(case: &Case, high: f64) -> Self {
+    pub(crate) fn grow(case: &ExperimentCase, high: f64) -> Self {
         let rods = case.rods();
         let grains = grains(case, high);
         let pores = case.pores.map_or_else(Vec::new, |p| pores(case, &p, &rods, high));
@@ -136,7 +136,7 @@ impl Bodies {
     /// [`Cancelled`] soon after the job was.
     pub(crate) fn paint(
         &self,
-        case: &Case,
+        case: &ExperimentCase,
         grid: &Grid,
         job: &Job,
     ) -> Result<(Painted, [Vec<f32>; 2]), Cancelled> {
@@ -162,7 +162,7 @@ impl Bodies {
         Ok((painted, voids))
     }
 
-    fn layer(&self, case: &Case, grid: &Grid, z: usize) -> Layer {
+    fn layer(&self, case: &ExperimentCase, grid: &Grid, z: usize) -> Layer {
         let [nx, ny, _] = grid.size;
         let (n, edge, height) = (nx * ny, grid.voxel[0], grid.at(2, z));
         let mut layer = Layer { shares: vec![[0; 4]; n], pore: vec![0.0; n], crack: vec![0.0; n] };
@@ -269,7 +269,7 @@ impl Placed {
 }
 
 /// Somewhere in the slab.
-fn anywhere(case: &Case, high: f64, margin: f64, dice: &mut Dice) -> DVec3 {
+fn anywhere(case: &ExperimentCase, high: f64, margin: f64, dice: &mut Dice) -> DVec3 {
     let outline = case.outline();
     let half = outline.half();
     loop {
@@ -284,7 +284,7 @@ fn anywhere(case: &Case, high: f64, margin: f64, dice: &mut Dice) -> DVec3 {
     }
 }
 
-fn grains(case: &Case, high: f64) -> Vec<(Blob, f32)> {
+fn grains(case: &ExperimentCase, high: f64) -> Vec<(Blob, f32)> {
     let dice = &mut Dice::new(case.seed, 1);
     let slab = high + GRAIN.1;
     let wanted = COARSE * case.outline().area() * 2.0 * slab;
@@ -311,7 +311,7 @@ fn grains(case: &Case, high: f64) -> Vec<(Blob, f32)> {
     grains
 }
 
-fn pores(case: &Case, plan: &Pores, rods: &[Rod], high: f64) -> Vec<Blob> {
+fn pores(case: &ExperimentCase, plan: &Pores, rods: &[Rod], high: f64) -> Vec<Blob> {
     let dice = &mut Dice::new(case.seed, 2);
     let (low, top) = (1e-3 * plan.range_mm.0, 1e-3 * plan.range_mm.1);
     let slab = high + top;
@@ -348,7 +348,7 @@ fn pores(case: &Case, plan: &Pores, rods: &[Rod], high: f64) -> Vec<Blob> {
     pores
 }
 
-fn cracks(case: &Case, plan: &Cracks, rods: &[Rod]) -> Vec<Walk> {
+fn cracks(case: &ExperimentCase, plan: &Cracks, rods: &[Rod]) -> Vec<Walk> {
     let mut walks = Vec::new();
     for number in 0..plan.count {
         let dice = &mut Dice::new(case.seed, 100 + number as u64);
@@ -375,7 +375,7 @@ fn cracks(case: &Case, plan: &Cracks, rods: &[Rod]) -> Vec<Walk> {
 /// Of a crack, m.
 const STEP: f64 = 0.4e-3;
 
-fn walk(case: &Case, length: f64, width: f64, rods: &[Rod], dice: &mut Dice) -> Walk {
+fn walk(case: &ExperimentCase, length: f64, width: f64, rods: &[Rod], dice: &mut Dice) -> Walk {
     let outline = case.outline();
     // From near the surface inwards, or somewhere within.
     let inner = dice.0.unit() < 0.35;
@@ -391,7 +391,7 @@ fn walk(case: &Case, length: f64, width: f64, rods: &[Rod], dice: &mut Dice) -> 
 }
 
 fn stroll(
-    case: &Case,
+    case: &ExperimentCase,
     from: DVec2,
     heading: f64,
     length: f64,
@@ -429,7 +429,7 @@ fn stroll(
     walk
 }
 
-impl Truth {
+impl PlantedTruth {
     /// On the slice's pixels, each of `by` × `by` voxels in each of the `by` middle layers.
     #[must_use]
     pub fn of(painted: &Painted, voids: &[Vec<f32>; 2], by: usize) -> Self {

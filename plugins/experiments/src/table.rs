@@ -7,13 +7,13 @@ use serde::{Deserialize, Serialize};
 use super::{
     ExperimentError,
     apart::{Ablations, ablations},
-    case::{Case, Cases, Kind},
+    case::{CaseSet, ExperimentCase, Kind},
     correct::{Care, corrected, plain},
     ours::{self, Choice},
     paired::wilcoxon,
-    reference::{Marks, otsu, sauvola, strongest},
+    reference::{MethodMarks, otsu, sauvola, strongest},
     scan::{Made, make},
-    score::{Scored, Terms, scored},
+    score::{IntervalScore, Terms, scored},
 };
 use intrados_ct::{Picture, network::Network, slice::Slice};
 
@@ -22,7 +22,7 @@ pub(crate) const SCHEMA: &str = "intrados.experiment/1";
 
 /// One case by all methods, on the same projections.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Row {
+pub struct CaseRow {
     /// Its name.
     pub id: String,
     /// Column or beam.
@@ -78,13 +78,13 @@ pub struct Means {
 
 /// All of it. Serialises to `intrados.experiment/1`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Table {
+pub struct CaseTable {
     /// [`SCHEMA`].
     pub schema: &'static str,
     /// Version of the program.
     pub version: &'static str,
     /// Case by case.
-    pub cases: Vec<Row>,
+    pub cases: Vec<CaseRow>,
     /// Means over them.
     pub mean: Means,
     /// Cases in which ours is ahead of the reference.
@@ -106,15 +106,15 @@ pub struct Table {
 
 /// One case with the marks of all methods, for pictures.
 #[derive(Debug, Clone)]
-pub struct Judged {
+pub struct JudgedCase {
     /// Scores.
-    pub row: Row,
+    pub row: CaseRow,
     /// The case.
     pub made: Made,
     /// Its plain and its corrected slice.
     pub slices: [Slice; 2],
     /// Marks of the reference, the strong reference and ours.
-    pub marks: [Marks; 3],
+    pub marks: [MethodMarks; 3],
 }
 
 /// Makes a case and judges every method on it; with `apart`, ours with parts left out too.
@@ -122,11 +122,11 @@ pub struct Judged {
 /// # Errors
 /// Cancelled, or the program's tables are damaged.
 pub fn judge(
-    case: &Case,
-    cases: &Cases,
+    case: &ExperimentCase,
+    cases: &CaseSet,
     apart: bool,
     job: &Job,
-) -> Result<Judged, ExperimentError> {
+) -> Result<JudgedCase, ExperimentError> {
     let mut clock = cpu_seconds();
     let mut lap = || {
         let now = cpu_seconds();
@@ -148,18 +148,18 @@ pub fn judge(
     let own = lap();
     let [o, r, s] = [&ours, &weak, &strong].map(|marks| scored(marks, &made.truth, case.seed));
     let otsu_corrected = scored(&otsu(&second), &made.truth, case.seed).score;
-    let mut row = Row::new(case, &made, [o, r, s], otsu_corrected, [making, references, own]);
+    let mut row = CaseRow::new(case, &made, [o, r, s], otsu_corrected, [making, references, own]);
     if apart {
         row.ablations = Some(ablations(case, &made, &second, job)?);
     }
-    Ok(Judged { row, slices: [first, second], marks: [weak, strong, ours], made })
+    Ok(JudgedCase { row, slices: [first, second], marks: [weak, strong, ours], made })
 }
 
-impl Row {
+impl CaseRow {
     fn new(
-        case: &Case,
+        case: &ExperimentCase,
         made: &Made,
-        [ours, reference, strong]: [Scored; 3],
+        [ours, reference, strong]: [IntervalScore; 3],
         otsu_corrected: f64,
         cpu_seconds: [f64; 3],
     ) -> Self {
@@ -186,14 +186,14 @@ impl Row {
     }
 }
 
-impl Table {
+impl CaseTable {
     /// Of rows in their order.
     #[must_use]
-    pub fn of(rows: Vec<Row>) -> Self {
+    pub fn of(rows: Vec<CaseRow>) -> Self {
         let n = rows.len().max(1) as f64;
-        let mean = |of: &dyn Fn(&Row) -> f64| rows.iter().map(of).sum::<f64>() / n;
+        let mean = |of: &dyn Fn(&CaseRow) -> f64| rows.iter().map(of).sum::<f64>() / n;
         let against =
-            |of: fn(&Row) -> f64| rows.iter().map(|r| r.ours - of(r)).collect::<Vec<f64>>();
+            |of: fn(&CaseRow) -> f64| rows.iter().map(|r| r.ours - of(r)).collect::<Vec<f64>>();
         let [weak, strong, third] = [
             against(|r| r.reference),
             against(|r| r.strong_reference),
@@ -233,7 +233,7 @@ impl Table {
 /// Found and true: green; true only: violet; found only: red. Cracks like pores.
 const COLOURS: [[u8; 3]; 3] = [[60, 170, 90], [170, 40, 190], [213, 62, 0]];
 
-impl Judged {
+impl JudgedCase {
     /// As a PNG: above, the plain slice and the corrected one; below, the plain one with what the
     /// reference found and the corrected one with what ours found.
     #[must_use]
@@ -264,7 +264,7 @@ impl Judged {
         median(body.map(|(v, _)| *v)).unwrap_or(1.0).max(f32::MIN_POSITIVE)
     }
 
-    fn colour(&self, marks: &Marks, i: usize) -> Option<[u8; 3]> {
+    fn colour(&self, marks: &MethodMarks, i: usize) -> Option<[u8; 3]> {
         let truth = &self.made.truth;
         match (
             marks.pores.data[i] || marks.cracks.data[i],
