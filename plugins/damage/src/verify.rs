@@ -168,8 +168,8 @@ fn pores(read: impl Fn(&Slice) -> Option<(f64, Estimate)>) -> Vec<Check> {
     };
     let (count, porosity) =
         read(&slice).unwrap_or((f64::NAN, Estimate { value: f64::NAN, std_error: f64::NAN }));
-    // Of a body its outermost three pixels are not read (`normal`).
-    let truth = holes.iter().map(|h| h[2] * h[2]).sum::<f64>() / (RADIUS - 3.0).powi(2);
+    // Of the whole section: its outermost three pixels, which are not read, have no pore.
+    let truth = holes.iter().map(|h| h[2] * h[2]).sum::<f64>() / RADIUS.powi(2);
     vec![
         Check::run("pores", "disc with 16 pores: how many are found", 16.0, 0.0, || count),
         // Circles of pixels have their area within a per cent, all sixteen together.

@@ -35,7 +35,8 @@ fn air(porosity: f32) -> Damage {
 
 /// Sections of 400 × 400, 450 across and 400 × 700 mm at .9 and .7 mm a pixel, bars of 16 to 25 mm;
 /// little air and much. Rolling is no part of the drawing, so that readings lie within less than
-/// their errors say.
+/// their errors say. Nor is rust that stays at a bar and hides of its loss up to 12/13 of what shows:
+/// half of that is added, and all of it is in the error.
 #[test]
 fn rust_is_read_from_bars() {
     for (scene, loss) in [
@@ -50,6 +51,7 @@ fn rust_is_read_from_bars() {
         let damage = [air(porosity), Damage::Corrosion { from: 0.0, to: 1.0, section_loss: loss }];
         for member in seen(scene, 1, &damage).members.iter().filter(|m| m.id != "G1") {
             let steel = member.slices[0].steel.unwrap();
+            let hidden = 12.0 / 13.0 * f64::from(loss);
             println!(
                 "{}, {loss:.2} of its bars lost, {:.0} % air: {:.3} ± {:.3}",
                 member.id,
@@ -59,8 +61,8 @@ fn rust_is_read_from_bars() {
             );
             assert_eq!(steel.bars, steel.laid);
             assert!(
-                (steel.loss.value - f64::from(loss)).abs() < 0.015
-                    && (0.02..0.06).contains(&steel.loss.std_error),
+                (-0.015..0.015 + 0.5 * hidden).contains(&(steel.loss.value - f64::from(loss)))
+                    && (0.02..0.06 + 0.3 * hidden).contains(&steel.loss.std_error),
                 "{}: {steel:?}",
                 member.id
             );
