@@ -151,7 +151,12 @@ pub fn capacity(
         if let Some(raised) = prepared.raised.as_mut().filter(|_| !is_told) {
             raised.to = Reach::Peak;
         }
-        strength(&prepared, job)
+        let state = match errors {
+            None => "as if it were sound",
+            Some(0.0) => "with what is known of its damage",
+            Some(_) => "with one standard error more of its damage than is known",
+        };
+        strength(&prepared, state, job)
     });
     let strengths = strengths.collect::<Result<Vec<Strength>, ForecastError>>()?;
     let factor = |k: usize| strengths[k.min(strengths.len() - 1)].peak.load_factor;
@@ -187,8 +192,8 @@ fn zones(scene: &Scene, prepared: &Prepared) -> Vec<Option<(String, usize)>> {
     zones
 }
 
-/// A life, and what is borne after it.
-fn strength(prepared: &Prepared, job: &Job) -> Result<Strength, ForecastError> {
+/// A life, and what is borne after it. In what `state` it lives, for people.
+fn strength(prepared: &Prepared, state: &str, job: &Job) -> Result<Strength, ForecastError> {
     // Solvers report shares of their own, and three are under way.
     let job = &job.part(0.0, 0.0);
     let lived = analyze(prepared, MarchSettings::of_life(), job, &mut ());
@@ -197,7 +202,10 @@ fn strength(prepared: &Prepared, job: &Job) -> Result<Strength, ForecastError> {
         _ if job.is_cancelled() => ForecastError::Cancelled,
         other => ForecastError::Because(other.to_string()),
     })?;
-    outcome.strength.ok_or(ForecastError::Because(outcome.complaint))
+    let complaint = outcome.complaint;
+    outcome.strength.ok_or_else(|| {
+        ForecastError::Because(format!("{state} it does not bear what acts on it: {complaint}"))
+    })
 }
 
 #[cfg(test)]
