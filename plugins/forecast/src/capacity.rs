@@ -20,7 +20,7 @@ use intrados_damage::zone::{ZONES, zone_at};
 use intrados_mechanics::{
     analysis::analyze,
     member::{Along, Handed, Meshing, Prepared, Reach, Weakening, prepare_within},
-    model::{Failure, MarchSettings},
+    model::MarchSettings,
     strength::{Mode, Strength},
 };
 use intrados_scene::Scene;
@@ -30,7 +30,7 @@ use serde::Serialize;
 
 use crate::{
     ForecastError,
-    life::{along, assumed_error},
+    life::{along, assumed_error, failed},
 };
 
 /// Relative standard error of a computed strength: the coefficient of variation of computed over
@@ -197,11 +197,7 @@ fn strength(prepared: &Prepared, state: &str, job: &Job) -> Result<Strength, For
     // Solvers report shares of their own, and three are under way.
     let job = &job.part(0.0, 0.0);
     let lived = analyze(prepared, MarchSettings::of_life(), job, &mut ());
-    let (outcome, _) = lived.map_err(|e| match e {
-        Failure::Cancelled(_) => ForecastError::Cancelled,
-        _ if job.is_cancelled() => ForecastError::Cancelled,
-        other => ForecastError::Because(other.to_string()),
-    })?;
+    let (outcome, _) = lived.map_err(|why| failed(&why, job))?;
     let complaint = outcome.complaint;
     outcome.strength.ok_or_else(|| {
         ForecastError::Because(format!("{state} it does not bear what acts on it: {complaint}"))

@@ -234,15 +234,8 @@ pub fn forecast(
     // Solvers would report shares of their own: how far the life is, its times tell.
     let march =
         MarchSettings { work: settings.work.unwrap_or(f64::INFINITY), ..MarchSettings::of_life() };
-    let (outcome, _) =
-        analyze(&prepared, march, &job.part(0.0, 0.0), &mut watch).map_err(|e| match e {
-            Failure::Cancelled(_) => ForecastError::Cancelled,
-            other if job.is_cancelled() => {
-                tracing::debug!("{other}");
-                ForecastError::Cancelled
-            }
-            other => ForecastError::Because(other.to_string()),
-        })?;
+    let (outcome, _) = analyze(&prepared, march, &job.part(0.0, 0.0), &mut watch)
+        .map_err(|why| failed(&why, job))?;
     outcome.warnings.iter().for_each(|w| tracing::warn!("{model}: {w}"));
     let gauges = std::mem::take(&mut watch.courses);
     let reached =
@@ -276,6 +269,15 @@ pub fn forecast(
             notes: outcome.warnings.iter().chain(&outcome.notes).cloned().collect(),
         });
     Ok(told.collect())
+}
+
+/// Why a life came to nothing: what fails once somebody has asked to stop was stopped.
+pub(crate) fn failed(why: &Failure, job: &Job) -> ForecastError {
+    if matches!(why, Failure::Cancelled(_)) || job.is_cancelled() {
+        tracing::debug!("{why}");
+        return ForecastError::Cancelled;
+    }
+    ForecastError::Because(why.to_string())
 }
 
 fn prepared(

@@ -252,8 +252,8 @@ impl Predictor {
         format!("the life of {}", names.join(" and "))
     }
 
-    fn name<'a>(&'a self, id: &'a String) -> &'a str {
-        self.names.get(id).unwrap_or(id)
+    fn name<'a>(&'a self, id: &'a str) -> &'a str {
+        self.names.get(id).map_or(id, String::as_str)
     }
 
     /// Whether all slices of a member have been read and it had any.
@@ -410,7 +410,7 @@ impl Predictor {
     /// What a model bears with what is known of its members by now.
     fn raise(&mut self, scene: &Scene, model: &str, job: &Job) -> Result<(), PredictError> {
         self.join(scene, job)?;
-        job.relabel(format!("the strength of {}", self.name(&model.to_owned())));
+        job.relabel(format!("the strength of {}", self.name(model)));
         let members = scene.structure.assembly(model).into_iter().flat_map(|a| &a.members);
         let losses = members.filter_map(|id| {
             let index = scene.members.iter().position(|m| m.id == *id)?;
