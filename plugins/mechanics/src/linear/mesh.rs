@@ -12,7 +12,7 @@ use super::{
 };
 use crate::read::{
     Fault, LabelMap,
-    abaqus::card::{Card, Row},
+    abaqus::card::{Card, Row, side_number},
     label, quote,
 };
 
@@ -240,10 +240,8 @@ impl Reader {
         letter: &str,
         row: Row<'_>,
     ) -> Result<u8, Fault> {
-        let upper = side.to_ascii_uppercase();
-        let number = upper.strip_prefix(letter).and_then(|n| n.parse::<u8>().ok());
         let raw = &self.raw[element as usize];
-        number
+        side_number(side, letter)
             .and_then(|n| raw.kind.face(n))
             .ok_or_else(|| row.fault(format!("element {} has no side {}", raw.label, quote(side))))
     }

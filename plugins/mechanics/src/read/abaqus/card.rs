@@ -202,6 +202,11 @@ pub(crate) struct Row<'a> {
     pub(crate) text: &'a str,
 }
 
+/// Number of the side that `P3` or `S3` (by `letter`) names.
+pub(crate) fn side_number(side: &str, letter: &str) -> Option<u8> {
+    side.to_ascii_uppercase().strip_prefix(letter)?.parse().ok()
+}
+
 impl<'a> Row<'a> {
     pub(crate) fn fault(&self, reason: impl Into<String>) -> Fault {
         Fault::at(self.line, reason)

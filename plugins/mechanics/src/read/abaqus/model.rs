@@ -4,7 +4,10 @@ use std::collections::BTreeMap;
 
 use glam::DVec3;
 
-use super::{Card, Fault, LabelMap, Reader, card::Row};
+use super::{
+    Card, Fault, LabelMap, Reader,
+    card::{Row, side_number},
+};
 use crate::{
     mesh::{Cell, ElementId},
     read::{Formulation, label, quote},
@@ -293,8 +296,7 @@ impl Reader {
         row: Row<'_>,
     ) -> Result<u8, Fault> {
         let upper = side.to_ascii_uppercase();
-        let number = upper.strip_prefix(letter).and_then(|n| n.parse::<u8>().ok());
-        match (element, number) {
+        match (element, side_number(side, letter)) {
             (ElementId::Hex(_), Some(face @ 1..=6)) => Ok(face - 1),
             (ElementId::Shell(_), _) if upper == "SPOS" || upper == "P" => Ok(0),
             _ => Err(row.fault(format!(
