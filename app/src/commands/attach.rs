@@ -44,11 +44,7 @@ pub(crate) fn run(session: &Session, args: &args::Attach) -> Result<Outcome, Fai
     let what = Attachment { member: known_as(session, &project, &args.member)?, ..what };
     let progress = session.watch(format!("attaching to {}", args.project.display()));
     let proposal = project.propose(&what, &session.job)?;
-    let notes =
-        attaching::examine(&proposal, &what, &session.job).map_err(|unfit| match unfit {
-            Unfit::Because(why) => Failure::BadInput(why),
-            Unfit::Cancelled => Failure::Interrupted,
-        })?;
+    let notes = attaching::examine(&proposal, &what, &session.job).map_err(refused)?;
     let (name, added) = (proposal.name.clone(), proposal.added.clone());
     let member_name = proposal.scene.name_of(&what.member).to_owned();
     let files = proposal.commit()?;
@@ -85,10 +81,17 @@ fn attachment(args: &args::Attach) -> Result<Attachment, Failure> {
     })
 }
 
+fn refused(unfit: Unfit) -> Failure {
+    match unfit {
+        Unfit::Because(why) => Failure::BadInput(why),
+        Unfit::Cancelled => Failure::Interrupted,
+    }
+}
+
 /// A photograph that the report can show.
 fn picture(file: Option<&Path>) -> Result<Option<PathBuf>, Failure> {
     let Some(file) = file else { return Ok(None) };
-    attaching::picture(file).map_err(Failure::BadInput)?;
+    attaching::picture(file).map_err(refused)?;
     Ok(Some(file.to_owned()))
 }
 

@@ -46,10 +46,10 @@ pub fn examine(
 /// Refuses what a report cannot show as a photograph of a finding.
 ///
 /// # Errors
-/// Why not, one line.
-pub fn picture(file: &Path) -> Result<(), String> {
+/// [`Unfit`].
+pub fn picture(file: &Path) -> Result<(), Unfit> {
     let ending = file.extension().unwrap_or_default().to_ascii_lowercase();
-    let bad = |why| Err(format!("{}: {why}", file.display()));
+    let bad = |why| Err(Unfit::Because(format!("{}: {why}", file.display())));
     match ["jpg", "jpeg", "png"].iter().any(|known| ending == *known) {
         false => bad("is neither a JPEG nor a PNG: convert it"),
         true if file.is_file() && Picture::read(file, 8).is_none() => {
