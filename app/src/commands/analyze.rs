@@ -512,6 +512,16 @@ impl Report {
                 t.losses.concrete_pa / MPA
             );
         }
+        for (m, pipe) in self.members.iter().filter_map(|m| Some((m, m.pipe?))) {
+            text += &format!(
+                "{}, its steel pipe: {:.0} MPa around and {:.0} along at most, {:.0} and {:.0} on average at the end\n",
+                m.name,
+                pipe.around_pa / MPA,
+                pipe.along_pa / MPA,
+                pipe.final_around_pa / MPA,
+                pipe.final_along_pa / MPA
+            );
+        }
         for m in &self.members {
             if let Some(rust) = m.corrosion {
                 let begins = rust

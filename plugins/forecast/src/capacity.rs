@@ -19,7 +19,7 @@ use glam::DVec3;
 use intrados_damage::zone::{ZONES, zone_at};
 use intrados_mechanics::{
     analysis::analyze,
-    member::{Along, Handed, Meshing, Prepared, Reach, Weakening, prepare_within},
+    member::{Along, Handed, Meshing, Prepared, Reach, Weakening, elastic, prepare_within},
     model::MarchSettings,
     strength::{Mode, Strength},
 };
@@ -125,6 +125,12 @@ pub fn capacity(
     let because = |e: &dyn std::fmt::Display| ForecastError::Because(e.to_string());
     let no_member = || because(&format!("{model}: no such member"));
     let assembly = scene.structure.assembly(model).ok_or_else(no_member)?;
+    if let (Some(_), Some(matter)) = (elastic(assembly), &assembly.matter) {
+        return Err(because(&format!(
+            "it is of {}, whose failure is not computed: its forecast tells how it is stressed",
+            matter.name
+        )));
+    }
     let mut sound = prepare_within(scene, assembly, handed, Meshing::default(), job)
         .map_err(|e| if job.is_cancelled() { ForecastError::Cancelled } else { because(&e) })?;
     if sound.raised.is_none() {

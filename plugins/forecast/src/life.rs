@@ -24,8 +24,11 @@ use intrados_mechanics::{
         concrete::{Class, secant_modulus, tensile_strength},
         durability::{Bars, Corrosion, CorrosionError, Lost},
     },
-    member::{Handed, Meshing, Part, Prepared, largest_element, prepare_within},
+    member::{
+        ElasticMatter, Handed, Meshing, Part, Prepared, elastic, largest_element, prepare_within,
+    },
     model::{Failure, Gauge, History, MarchSettings, Point, SteelKind, Step, System, past_peak},
+    tensor::Principal,
 };
 use intrados_scene::{Assembly, Frame, MemberKind, Scene, structure::Body};
 use intrados_stage::{
@@ -79,7 +82,7 @@ pub struct Foretold {
     pub cracked: f64,
     /// Widest crack, mm.
     pub crack_mm: f64,
-    /// Share of a section that is crushed, 0 to 1.
+    /// Share of a section that is crushed, or of elastic matter stressed beyond its strength, 0 to 1.
     pub crushed: f64,
     /// Share of the bars' section lost to rust, 0 to 1; none where no bar runs or rust is not
     /// computed.
@@ -154,6 +157,30 @@ impl Rust {
     }
 }
 
+/// How an elastic matter is stressed through its life.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Stressed {
+    /// What people call the matter.
+    pub matter: String,
+    /// Largest principal stress, of either sign, Pa.
+    pub peak_pa: f64,
+    /// Characteristic strength, Pa.
+    pub strength_pa: f64,
+}
+
+impl Stressed {
+    /// Why a life that nothing has happened in is no evidence.
+    #[must_use]
+    pub fn told(&self) -> String {
+        format!(
+            "of {}, computed as elastic: it is stressed to {:.2} of the {:.1} MPa that it bears, which tells nothing of its decay, fatigue and joints",
+            self.matter,
+            self.peak_pa / 1e6,
+            self.strength_pa / 1e6
+        )
+    }
+}
+
 /// The future of one member.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Forecast {
@@ -169,6 +196,9 @@ pub struct Forecast {
     pub age_years: f64,
     /// What is known of its rust.
     pub rust: Rust,
+    /// Of elastic matter: how it is stressed; none of concrete.
+    #[serde(default)]
+    pub elastic: Option<Stressed>,
     /// Largest compression of concrete, Pa (negative).
     pub peak_compression_pa: f64,
     /// Largest stress of a bar, Pa.
@@ -255,6 +285,7 @@ pub fn forecast(
         outcome.members.iter().zip(watch.parts).zip(rust).map(|((m, part), rust)| Forecast {
             id: m.name.clone(),
             rust,
+            elastic: scene.structure.assembly(model).and_then(|a| part.stressed(a)),
             now: part.now,
             later: outcome.complaint.is_empty().then_some(part.last),
             ahead_years: settings.ahead_years,
@@ -379,6 +410,9 @@ struct PartWatch {
     /// Mean tensile strength, Pa, and E_s/E_cm.
     tensile_strength: f64,
     modular_ratio: f64,
+    /// Of elastic matter: what it bears, and its largest principal stress so far, Pa.
+    elastic: Option<ElasticMatter>,
+    peak: f64,
     now: [Foretold; ZONES],
     last: [Foretold; ZONES],
 }
@@ -405,6 +439,7 @@ impl<'a> Watch<'a> {
         };
         let is_ring = |kind| matches!(kind, MemberKind::Lining | MemberKind::Segment);
         let empty = [Foretold::default(); ZONES];
+        let elastic = scene.structure.assembly(&prepared.id).and_then(elastic);
         let part = |p: &Part| {
             let class = scene
                 .members
@@ -417,6 +452,8 @@ impl<'a> Watch<'a> {
                 ring: is_ring(p.kind),
                 tensile_strength: tensile_strength(fck),
                 modular_ratio: E_STEEL / secant_modulus(fck + 8e6),
+                elastic,
+                peak: 0.0,
                 now: empty,
                 last: empty,
             }
@@ -561,7 +598,12 @@ impl<'a> Watch<'a> {
             for point in &points[hex as usize] {
                 let [tension, compression] = point.damage;
                 layer.cracked += if tension > CRACKED { volume / 8.0 } else { 0.0 };
-                layer.crushed += volume / 8.0 * past_peak([0.0, compression]);
+                layer.crushed += volume / 8.0
+                    * match watch.elastic {
+                        Some(matter) if largest(point) > matter.strength => 1.0,
+                        Some(_) => 0.0,
+                        None => past_peak([0.0, compression]),
+                    };
                 layer.opening = layer.opening.max(point.crack);
             }
         }
@@ -613,7 +655,19 @@ impl<'a> Watch<'a> {
     }
 }
 
+/// The largest principal stress at a point, of either sign, Pa.
+fn largest(point: &Point) -> f64 {
+    Principal::of_stress(&point.stress).values.into_iter().map(f64::abs).fold(0.0, f64::max)
+}
+
 impl PartWatch {
+    /// How its matter is stressed, where that is elastic.
+    fn stressed(&self, assembly: &Assembly) -> Option<Stressed> {
+        let matter = assembly.matter.as_ref()?.name.clone();
+        let strength_pa = self.elastic?.strength;
+        Some(Stressed { matter, peak_pa: self.peak, strength_pa })
+    }
+
     /// Place along the axis (0 to 1), and about it (0 to 1).
     fn place(&self, point: DVec3) -> (f64, f64) {
         let from = point - self.frame.start.as_dvec3();
@@ -635,6 +689,10 @@ impl Observer for Watch<'_> {
         self.listen(structure, history, step.time)?;
         for part in 0..self.parts.len() {
             let zones = self.zones(part, history, points);
+            let hexes = self.prepared.parts[part].hexes.iter();
+            let peak = hexes.flat_map(|&hex| &points[hex as usize]).map(largest);
+            let peak = peak.fold(self.parts[part].peak, f64::max);
+            self.parts[part].peak = peak;
             if step.time <= self.until + 60.0 {
                 self.parts[part].now = zones;
             }
@@ -697,11 +755,15 @@ pub(crate) fn assumed_error(assembly: &Assembly) -> f64 {
 }
 
 impl Forecast {
-    /// What it says of the member now; with `relative` error of the model.
+    /// What it says of the member now; with `relative` error of the model. Elastic matter that
+    /// bears its stress shows no damage of any kind, and so nothing is said of it.
     #[must_use]
     pub fn evidence(&self, relative: f64) -> Option<Evidence> {
         let relative = relative.hypot(self.assumed_error);
-        let reading = |value: f64| Some(Estimate { value, std_error: relative * value });
+        let reading = |value: f64| {
+            let is_told = self.elastic.is_none() || value > 0.0;
+            is_told.then_some(Estimate { value, std_error: relative * value })
+        };
         // What was assumed has a spread of its own; what was given errs as the rest of the model.
         let steel = |told: &Foretold| {
             let value = told.steel_lost?;
@@ -731,9 +793,10 @@ impl Forecast {
             _ => "no open cracks".into(),
         };
         let mut basis = format!(
-            "life of {:.0} years in finite elements; worst {} of the axis: {cracks}, {}",
+            "life of {:.0} years in finite elements; worst {} of the axis: {}, {}",
             self.age_years,
             place(worst),
+            self.elastic.as_ref().map_or(cracks, Stressed::told),
             self.rust.says(steel(now))
         );
         if let Some(later) = &self.later {

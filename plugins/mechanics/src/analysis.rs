@@ -101,6 +101,23 @@ pub struct MemberOutcome {
     pub corrosion: Option<Corrosion>,
     /// Its tendons.
     pub tendons: Vec<TendonOutcome>,
+    /// The steel pipe inside of it; none: it has none.
+    #[serde(default)]
+    pub pipe: Option<PipeOutcome>,
+}
+
+/// The steel pipe of a lining: largest stress of either sign in the middle of its wall.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct PipeOutcome {
+    /// Around, Pa.
+    pub around_pa: f64,
+    /// Along, Pa.
+    pub along_pa: f64,
+    /// Mean around at the end, Pa: times thickness over radius the share of the inner pressure that
+    /// it bears.
+    pub final_around_pa: f64,
+    /// Mean along at the end, Pa.
+    pub final_along_pa: f64,
 }
 
 /// How well the cubes of an imported member agree with its surface.
@@ -353,6 +370,7 @@ impl MemberOutcome {
             }),
             corrosion: None,
             tendons: Vec::new(),
+            pipe: None,
         }
     }
 }
@@ -402,16 +420,41 @@ impl Outcome {
     }
 }
 
+impl PipeOutcome {
+    fn take(&mut self, structure: &System, axis: DVec3, history: &History) -> Result<(), Failure> {
+        let count = structure.model.mesh.shells.len();
+        let mut sum = [0.0; 2];
+        for shell in 0..count {
+            let [around, along] = structure.wall_stress(shell, axis, history)?;
+            let largest = |kept: &mut f64, new: f64| {
+                if new.abs() > kept.abs() {
+                    *kept = new;
+                }
+            };
+            largest(&mut self.around_pa, around);
+            largest(&mut self.along_pa, along);
+            sum = [sum[0] + around, sum[1] + along];
+        }
+        [self.final_around_pa, self.final_along_pa] = sum.map(|s| s / count.max(1) as f64);
+        Ok(())
+    }
+}
+
 /// Extremes of steel.
 struct SteelPeaks {
     peaks: Vec<f64>,
     /// Of bars between nodes of the mesh.
     rods: f64,
+    /// Axis of the pipe, and its stresses.
+    pipe: Option<(DVec3, PipeOutcome)>,
 }
 
 impl SteelPeaks {
     fn new(prepared: &Prepared) -> Self {
-        Self { peaks: vec![0.0; prepared.model.steel.len()], rods: 0.0 }
+        let has_pipe = !prepared.model.mesh.shells.is_empty();
+        let axis = prepared.axis.filter(|_| has_pipe).map(|[_, axis]| axis);
+        let pipe = axis.map(|axis| (axis, PipeOutcome::default()));
+        Self { peaks: vec![0.0; prepared.model.steel.len()], rods: 0.0, pipe }
     }
 
     fn take(&mut self, structure: &System, history: &History) -> Result<(), Failure> {
@@ -420,6 +463,9 @@ impl SteelPeaks {
         }
         for rod in 0..structure.model.mesh.rods.len() {
             self.rods = self.rods.max(structure.bar_stress(rod, history)?.abs());
+        }
+        if let Some((axis, pipe)) = &mut self.pipe {
+            pipe.take(structure, *axis, history)?;
         }
         Ok(())
     }
@@ -434,6 +480,7 @@ impl SteelPeaks {
             return;
         };
         member.peak_bar_stress_pa = self.rods;
+        member.pipe = self.pipe.map(|(_, pipe)| pipe);
         member.corrosion = corrosion(&prepared.model.steel, history.time);
         for ((steel, &peak), works) in
             prepared.model.steel.iter().zip(&self.peaks).zip(&history.steel)

@@ -158,7 +158,7 @@ fn limits_of_states(members: &[MemberPrediction]) -> Vec<String> {
 /// What a member is of, for people.
 pub(crate) fn of_what(concrete: &str, matter: Option<&Matter>) -> String {
     match matter {
-        Some(matter) => format!("{}, computed as {concrete}", matter.name),
+        Some(matter) => matter.computed_as(concrete),
         None => concrete.to_owned(),
     }
 }

@@ -144,10 +144,9 @@ fn member(scene: &Scene, index: usize, m: &Member) -> MemberBasis {
         length_m,
         size: format!("{length_m:.2} m {long}{wide}{volume}"),
         across_m,
-        concrete: assembly.and_then(|a| a.matter.as_ref()).map_or_else(
-            || m.concrete.clone(),
-            |matter| format!("{}, computed as {}", matter.name, m.concrete),
-        ),
+        concrete: assembly
+            .and_then(|a| a.matter.as_ref())
+            .map_or_else(|| m.concrete.clone(), |matter| matter.computed_as(&m.concrete)),
         steel: assembly.map_or_else(|| "none known".into(), steel),
         exposure: m
             .exposure

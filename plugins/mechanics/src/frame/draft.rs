@@ -19,8 +19,7 @@ use super::{
 };
 use crate::{
     element::shell::Shell,
-    material::concrete::Properties,
-    member::{Axes, imported, matter},
+    member::{Axes, ElasticMatter, imported, matter},
 };
 
 /// Stations of a bar closer than this share of its length are one.
@@ -46,7 +45,7 @@ pub(super) struct Part<'a> {
     pub(super) axes: Axes,
     pub(super) solid: Solid,
     pub(super) shape: Shape,
-    pub(super) concrete: Properties,
+    pub(super) matter: ElasticMatter,
     /// Of a bar: m along it, ascending, a point each.
     pub(super) stations: Vec<f64>,
     /// The first of its points among all, and how many it has.
@@ -197,7 +196,7 @@ impl<'a> Draft<'a> {
 /// Where a place on an axis begins and ends.
 fn ends(place: &Place) -> Vec<f64> {
     match *place {
-        Place::Section(at) => vec![f64::from(at)],
+        Place::Section(at) | Place::Pipe(at) => vec![f64::from(at)],
         Place::Surface { from, to, .. } => vec![f64::from(from), f64::from(to)],
         Place::Start | Place::End | Place::Top | Place::Bottom | Place::Whole => Vec::new(),
     }
@@ -233,10 +232,9 @@ impl<'a> Part<'a> {
         };
         let shape = Shape::of(assembly, &axes, &solid)
             .ok_or("its surface is cut into no sections: close it")?;
-        let concrete =
-            matter::properties(scene, &assembly.concrete).map_err(|why| why.to_string())?;
+        let matter = matter::unbroken(scene, assembly).map_err(|why| why.to_string())?;
         let (stations, points) = (Vec::new(), Vec::new());
-        Ok(Self { assembly, axes, solid, shape, concrete, stations, first: 0, points })
+        Ok(Self { assembly, axes, solid, shape, matter, stations, first: 0, points })
     }
 
     /// How far along its axis a place is, 0 to 1.
@@ -274,7 +272,7 @@ impl<'a> Part<'a> {
             all.iter().copied().filter(|s| keep(s)).collect()
         };
         match *place {
-            Place::Section(at) => point(f64::from(at)),
+            Place::Section(at) | Place::Pipe(at) => point(f64::from(at)),
             Place::Start => of(&|s| s.normal.dot(along) < -LOOKS && self.share(s.at) < 0.02),
             Place::End => of(&|s| s.normal.dot(along) > LOOKS && self.share(s.at) > 0.98),
             Place::Whole => of(&|s| s.normal.dot(along).abs() < 0.5),
@@ -635,7 +633,7 @@ fn turned(samples: &[Sample], middle: DVec3, held: [bool; 3]) -> Vec<DVec3> {
 impl Part<'_> {
     /// How stiff it is against force and moment, N/m and N m: E A/L and E I/L at most.
     fn stiffness(&self) -> (f64, f64) {
-        let e = self.concrete.modulus;
+        let e = self.matter.law.modulus;
         match &self.shape {
             Shape::Bar(bar) => {
                 let length = bar.lengths()[bar.pieces.len()];
@@ -654,7 +652,7 @@ impl Part<'_> {
 
     /// Lays its beams or plates into a model.
     fn lay(&self, built: &mut Built, p: usize) {
-        let (e, nu) = (self.concrete.modulus, self.concrete.poisson);
+        let (e, nu) = (self.matter.law.modulus, self.matter.law.poisson);
         let ends = &built.ends[self.first..self.first + self.points.len()];
         let (beams, plates) = (built.model.beams.len(), built.model.plates.len());
         match &self.shape {

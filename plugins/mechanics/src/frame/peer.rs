@@ -25,7 +25,7 @@ use super::{
     section::Section,
     whole::{own_weight, whole},
 };
-use crate::{material::concrete::Properties, member::GRAVITY};
+use crate::{member::GRAVITY, model::Elastic};
 
 /// Arms shorter than this are none, m.
 const ARM: f64 = 1e-3;
@@ -150,7 +150,7 @@ impl Deck {
         std::fs::write(path, text).unwrap();
     }
 
-    fn text(&self, model: &Model, concrete: &Properties) -> String {
+    fn text(&self, model: &Model, concrete: &Elastic) -> String {
         let (young, poisson) = (concrete.modulus, 0.0);
         let mut text = String::from("*NODE, NSET=ALL\n");
         for (i, p) in self.nodes.iter().enumerate() {
@@ -241,12 +241,12 @@ fn the_slabs_of_the_bridge_sag_as_in_calculix() {
     // There a beam weighs what its section does, and no more.
     for (b, along) in &mut case.beams {
         let area = built.model.beams[*b as usize].0.section.area;
-        along.force = -GRAVITY * draft.parts[0].concrete.density * area * DVec3::Y;
+        along.force = -GRAVITY * draft.parts[0].matter.law.density * area * DVec3::Y;
     }
     // Plates likewise, and 5 kN/m² on the sheets that lie.
     case.plates.clear();
     for (k, (plate, _)) in built.model.plates.iter().enumerate() {
-        let own = -GRAVITY * draft.parts[0].concrete.density * plate.thickness * DVec3::Y;
+        let own = -GRAVITY * draft.parts[0].matter.law.density * plate.thickness * DVec3::Y;
         case.plates.push((k as u32, own));
         let [a, b, c, d] = plate.nodes;
         if (c - a).cross(d - b).normalize().y.abs() > 0.7 {
@@ -259,7 +259,7 @@ fn the_slabs_of_the_bridge_sag_as_in_calculix() {
     let mut sums: BTreeMap<u32, DVec3> = BTreeMap::new();
     case.plates.iter().for_each(|(k, p)| *sums.entry(*k).or_default() += *p);
     let merged = Case { plates: sums.into_iter().collect(), ..case.clone() };
-    let concrete = &draft.parts[0].concrete;
+    let concrete = &draft.parts[0].matter.law;
     let deck = Deck::of(&built.model, &merged, concrete.density);
     let folder = tempfile::tempdir().unwrap();
     let text = deck.text(&built.model, concrete);

@@ -368,7 +368,8 @@ impl Part<'_> {
         let force = |force: DVec3| Along { force, ..Along::default() };
         match action {
             Action::SelfWeight => {
-                let weight = -GRAVITY * self.concrete.density * self.fullness(built, p) * DVec3::Y;
+                let weight =
+                    -GRAVITY * self.matter.law.density * self.fullness(built, p) * DVec3::Y;
                 for b in elements.beams.clone() {
                     let area = built.model.beams[b].0.section.area;
                     case.beams.push((b as u32, force(area * weight)));
@@ -398,7 +399,7 @@ impl Part<'_> {
                 self.line(built, p, [from, to], (to - from) * total, case);
             }
             Action::Temperature { uniform_k, difference_k } => {
-                let alpha = self.concrete.expansion;
+                let alpha = self.matter.law.expansion;
                 for b in elements.beams.clone() {
                     let height = 2.0 * built.model.beams[b].0.section.reach[0];
                     let bend = alpha * f64::from(*difference_k) / height;
@@ -409,7 +410,10 @@ impl Part<'_> {
                     notes.push(format!("{}: temperature of plates is left out", self.assembly.id));
                 }
             }
-            Action::InnerPressure { .. } | Action::Displacement { .. } | Action::Air { .. } => {
+            Action::InnerPressure { .. }
+            | Action::Displacement { .. }
+            | Action::PipeTemperature { .. }
+            | Action::Air { .. } => {
                 notes.push(format!(
                     "{}: given displacements, air and inner pressure are left out of the whole",
                     self.assembly.id
@@ -693,8 +697,8 @@ fn without(
     let rises = before.iter().filter_map(|m| {
         let p = draft.parts.iter().position(|part| part.assembly.id == m.name)?;
         let (before_pa, after_pa) = (m.peak_edge_stress_pa, peaks[p].0);
-        let rise = (after_pa - before_pa) / draft.parts[p].concrete.fctm;
-        let after_over_strength = after_pa / draft.parts[p].concrete.fctm;
+        let strength = draft.parts[p].matter.strength;
+        let [rise, after_over_strength] = [after_pa - before_pa, after_pa].map(|s| s / strength);
         let of = Rise { member: m.name.clone(), before_pa, after_pa, after_over_strength };
         (p != gone && rise > 0.0).then_some((rise, of))
     });

@@ -1,6 +1,6 @@
 //! What holds a member, what acts on it, and when.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use glam::DVec3;
 use intrados_scene::structure::{self, Body as Shape, GroundModel, Hold, Place};
@@ -196,6 +196,11 @@ impl Draft<'_> {
                 Action::Faces(self.faces(place).into_iter().map(|face| (face, pressure)).collect())
             }
             Written::InnerPressure { pressure_kpa } => {
+                let pressure = f64::from(*pressure_kpa) * 1e3;
+                if self.pipe().is_some() {
+                    let shells = 0..self.model.mesh.shells.len() as u32;
+                    return Ok(Some(Action::Shells(shells.map(|s| (s, pressure)).collect())));
+                }
                 let inner = self.model.mesh.face_sets.get("inner").cloned().unwrap_or_default();
                 if inner.is_empty() {
                     return Err(self.unsupported(format!(
@@ -203,12 +208,16 @@ impl Draft<'_> {
                         load.name
                     )));
                 }
-                Action::Faces(
-                    inner.into_iter().map(|face| (face, f64::from(*pressure_kpa) * 1e3)).collect(),
-                )
+                Action::Faces(inner.into_iter().map(|face| (face, pressure)).collect())
             }
             Written::Displacement { place, displacement_mm } => {
                 let nodes = self.nodes(place);
+                if nodes.is_empty() {
+                    return Err(self.unsupported(format!(
+                        "load {} moves no node: widen its place, or give the member the pipe that it names",
+                        load.name
+                    )));
+                }
                 let move_by = displacement_mm.as_dvec3() / 1000.0;
                 Action::Displacement(
                     nodes
@@ -223,6 +232,19 @@ impl Draft<'_> {
             }
             // Its heat is conducted first.
             Written::Air { .. } => return Ok(None),
+            Written::PipeTemperature { warmer_k } => {
+                if self.pipe().is_none() {
+                    return Err(self.unsupported(format!(
+                        "load {} warms a pipe, and it has none: give its tunnel a pipe",
+                        load.name
+                    )));
+                }
+                let mut warmth = vec![0.0; self.model.mesh.nodes.len()];
+                for node in self.model.mesh.shells.iter().flat_map(|shell| shell.nodes) {
+                    warmth[node as usize] = f64::from(*warmer_k);
+                }
+                Action::Temperature(warmth)
+            }
             Written::Temperature { uniform_k, difference_k } => {
                 Action::Temperature(self.warmth(f64::from(*uniform_k), f64::from(*difference_k)))
             }
@@ -318,7 +340,7 @@ impl Draft<'_> {
             match *place {
                 Place::Start => near(at.z, 0.0),
                 Place::End => near(at.z, length),
-                Place::Section(_) => false,
+                Place::Section(_) | Place::Pipe(_) => false,
                 Place::Whole => is_side,
                 Place::Top => normal.y > LOOKS,
                 Place::Bottom => normal.y < -LOOKS,
@@ -341,9 +363,12 @@ impl Draft<'_> {
     /// Nodes of a place.
     fn nodes(&self, place: &Place) -> Vec<u32> {
         let mesh = &self.model.mesh;
-        if let Place::Section(at) = *place {
+        if let Place::Section(at) | Place::Pipe(at) = *place {
             let (z, reach) = (f64::from(at) * self.axes.length, 1e-6 * self.axes.length.max(1.0));
+            let of_pipe: BTreeSet<u32> = mesh.shells.iter().flat_map(|s| s.nodes).collect();
+            let is_pipe = matches!(place, Place::Pipe(_));
             return (0..mesh.nodes.len() as u32)
+                .filter(|n| of_pipe.contains(n) == is_pipe)
                 .filter(|&n| (self.axes.local(mesh.nodes[n as usize]).z - z).abs() < reach)
                 .collect();
         }

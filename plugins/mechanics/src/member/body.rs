@@ -1,16 +1,16 @@
 //! Meshes of members.
 
-use std::f64::consts::PI;
+use std::{collections::BTreeMap, f64::consts::PI};
 
 use glam::DVec3;
 use intrados_scene::{
     MemberKind,
-    structure::{Action, Body, BoxSection, GroundModel, Place, Section},
+    structure::{Action, Body, BoxSection, GroundModel, Pipe, Place, Section},
 };
 
 use super::{Draft, MemberError, Meshing, Part};
 use crate::mesh::{
-    ElementId, Layer, Mesh, MeshError, Polar, Rings, divide,
+    ElementId, Interface, Layer, Mesh, MeshError, Polar, Rings, Shell, divide,
     section::{Girder, Section as Plane},
 };
 
@@ -24,6 +24,8 @@ pub(super) const CUSHION: &str = "cushion";
 pub(super) const JOINT: &str = "joint";
 pub(super) const RING_JOINT: &str = "ring joint";
 pub(super) const GROUND: &str = "ground";
+pub(super) const PIPE: &str = "pipe";
+pub(super) const PIPE_CUSHION: &str = "pipe cushion";
 
 impl Draft<'_> {
     /// Makes the mesh and puts it into the world.
@@ -73,7 +75,7 @@ impl Draft<'_> {
             _ => None,
         });
         let of_places = places.chain(of_loads).flat_map(|place| match *place {
-            Place::Section(at) => vec![at],
+            Place::Section(at) | Place::Pipe(at) => vec![at],
             Place::Surface { from, to, .. } => vec![from, to],
             Place::Start | Place::End | Place::Top | Place::Bottom | Place::Whole => vec![],
         });
@@ -163,7 +165,20 @@ impl Draft<'_> {
             &planes,
             meshing.element.unwrap_or((length / 6.0).max(around).min(1.5 * around)),
         );
-        Polar { layers, angles, z }.build()
+        let mut mesh = Polar { layers, angles, z }.build()?;
+        if let Some(pipe) = self.pipe() {
+            lay_pipe(&mut mesh, pipe);
+            mesh.check()?;
+        }
+        Ok(mesh)
+    }
+
+    /// The steel pipe of a tunnel that has one.
+    pub(super) fn pipe(&self) -> Option<&Pipe> {
+        match &self.member.body {
+            Some(Body::Tunnel { pipe, .. }) => pipe.as_ref(),
+            _ => None,
+        }
     }
 
     /// Every pour becomes a region of its own; bricks that belong to none go with the first.
@@ -246,6 +261,34 @@ impl Draft<'_> {
             parts.push(Part { id, kind: MemberKind::Segment, hexes, ..self.part() });
         }
         parts
+    }
+}
+
+/// Shells along the inner faces of a ring about the z axis, in the middle of the pipe's wall, and
+/// the cushion between: an interface whose lower face is the pipe.
+fn lay_pipe(mesh: &mut Mesh, pipe: &Pipe) {
+    let [wall, cushion] =
+        [pipe.thickness_mm, pipe.cushion_mm].map(|millimetres| f64::from(millimetres) / 1000.0);
+    let [steel, soft] = [PIPE, PIPE_CUSHION].map(|name| mesh.region(name));
+    let inner = mesh.face_sets.get("inner").cloned().unwrap_or_default();
+    let mut of_pipe: BTreeMap<u32, u32> = BTreeMap::new();
+    for face in inner {
+        // A face looks out of its brick, towards the axis: turned round, outward.
+        let mut concrete = mesh.face(face);
+        concrete.reverse();
+        let nodes = concrete.map(|node| {
+            *of_pipe.entry(node).or_insert_with(|| {
+                let at = mesh.nodes[node as usize];
+                let radius = at.truncate().length();
+                let share = 1.0 - (cushion + 0.5 * wall) / radius;
+                mesh.nodes.push(DVec3::new(share * at.x, share * at.y, at.z));
+                (mesh.nodes.len() - 1) as u32
+            })
+        });
+        mesh.shells.push(Shell { nodes, region: steel });
+        let [a, b, c, d] = nodes;
+        let [e, f, g, h] = concrete;
+        mesh.interfaces.push(Interface { nodes: [a, b, c, d, e, f, g, h], region: soft });
     }
 }
 

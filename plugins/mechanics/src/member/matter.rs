@@ -1,13 +1,13 @@
 //! What the regions of a member are made of, and since when.
 
 use intrados_scene::{
-    Scene,
-    structure::{Body as Shape, Cement as Written, GroundModel},
+    Assembly, Scene,
+    structure::{Body as Shape, Cement as Written, Code as Rules, GroundModel},
 };
 
 use super::{
     Draft, MemberError, STRIKE,
-    body::{CUSHION, GROUND, JOINT, RING_JOINT, SEGMENTS},
+    body::{CUSHION, GROUND, JOINT, PIPE, PIPE_CUSHION, RING_JOINT, SEGMENTS},
 };
 use crate::{
     element::interface::Friction,
@@ -25,6 +25,9 @@ use crate::{
 const CUSHION_MODULUS: f64 = 50e6;
 /// Friction of a cushion layer.
 const CUSHION_FRICTION: f64 = 0.2;
+/// Structural steel (EN 1993-1-1, 3.2.6).
+const PIPE_STEEL: Elastic =
+    Elastic { modulus: 210e9, poisson: 0.3, expansion: 1.2e-5, density: 7850.0 };
 /// Age of precast segments when they are built in, s.
 const PRECAST: f64 = 90.0 * DAY;
 
@@ -65,6 +68,7 @@ impl Draft<'_> {
                     cohesion: 0.0,
                 }))
             }
+            PIPE | PIPE_CUSHION => self.piped(region, normal),
             GROUND => {
                 let Some(GroundModel::Solid { youngs_mpa, poisson, .. }) =
                     ground.as_ref().map(|g| &g.model)
@@ -91,8 +95,44 @@ impl Draft<'_> {
         })
     }
 
+    /// The wall of a tunnel's steel pipe, or the soft layer about it; without one steel lies on
+    /// concrete, whose contact is as stiff as that of joints (`bare`, Pa/m).
+    fn piped(&self, region: &str, bare: f64) -> Body {
+        let Some(pipe) = self.pipe() else {
+            return Body { matter: Matter::Elastic(PIPE_STEEL), birth: 0.0 };
+        };
+        let last = self.member.pours.iter().map(|p| f64::from(p.at_days) * DAY);
+        let bears = last.reduce(f64::max).unwrap_or(0.0) + STRIKE;
+        let birth = pipe.at_days.map_or(bears, |days| f64::from(days) * DAY);
+        let [thickness, cushion] =
+            [pipe.thickness_mm, pipe.cushion_mm].map(|mm| f64::from(mm) / 1000.0);
+        let normal = match cushion {
+            0.0 => bare,
+            cushion => f64::from(pipe.cushion_mpa) * 1e6 / cushion,
+        };
+        let matter = match region {
+            PIPE => Matter::Shell { elastic: PIPE_STEEL, thickness },
+            _ => Matter::Joint(Friction {
+                normal,
+                shear: 0.3 * normal,
+                friction: CUSHION_FRICTION,
+                cohesion: 0.0,
+            }),
+        };
+        Body { matter, birth }
+    }
+
     /// A part that is poured on the site.
     fn poured(&mut self, region: &str) -> Result<Body, MemberError> {
+        if let Some(matter) = elastic(self.member) {
+            self.notes.extend(self.member.matter.as_ref().map(|m| {
+                format!(
+                    "{} is elastic, alike in all directions ({} GPa, {} kg/m³): its creep, its joints and what is weaker across a grain are not computed",
+                    m.name, m.modulus_gpa, m.density_kg_m3
+                )
+            }));
+            return Ok(Body { matter: Matter::Elastic(matter.law), birth: f64::NEG_INFINITY });
+        }
         let class = &self.member.concrete;
         let pour = match region.rsplit_once("/pour ") {
             Some((_, number)) => {
@@ -157,11 +197,51 @@ impl Draft<'_> {
     }
 }
 
+/// An elastic material, and what it bears.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ElasticMatter {
+    /// Its law.
+    pub law: Elastic,
+    /// Tension that it bears, Pa.
+    pub strength: f64,
+}
+
+/// The matter of an assembly that is computed as elastic; none: it is computed as concrete.
+#[must_use]
+pub fn elastic(assembly: &Assembly) -> Option<ElasticMatter> {
+    let matter = assembly.matter.as_ref()?;
+    let law = Elastic {
+        modulus: f64::from(matter.modulus_gpa) * 1e9,
+        poisson: f64::from(matter.poisson),
+        expansion: f64::from(matter.expansion_1e6_k) * 1e-6,
+        density: f64::from(matter.density_kg_m3),
+    };
+    Some(ElasticMatter { law, strength: f64::from(matter.strength_mpa?) * 1e6 })
+}
+
+/// What an assembly is like as long as nothing breaks: of its own matter, or of its concrete.
+pub(crate) fn unbroken(scene: &Scene, assembly: &Assembly) -> Result<ElasticMatter, Error> {
+    if let Some(matter) = elastic(assembly) {
+        return Ok(matter);
+    }
+    let p = properties(scene, &assembly.concrete)?;
+    let law = Elastic {
+        modulus: p.modulus,
+        poisson: p.poisson,
+        expansion: p.expansion,
+        density: p.density,
+    };
+    Ok(ElasticMatter { law, strength: p.fctm })
+}
+
 /// All that is known and assumed of a concrete by its name.
 pub(crate) fn properties(scene: &Scene, name: &str) -> Result<Properties, Error> {
     let given = match scene.structure.concrete(name) {
         Some(c) => Given {
-            code: Code::Ec2,
+            code: match c.code {
+                Rules::Ec2 => Code::Ec2,
+                Rules::Mc2010 => Code::Mc2010,
+            },
             fck: Some(f64::from(c.fck_mpa) * 1e6),
             fcm: c.fcm_mpa.map(|v| f64::from(v) * 1e6),
             fctm: c.fctm_mpa.map(|v| f64::from(v) * 1e6),

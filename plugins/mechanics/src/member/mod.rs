@@ -18,6 +18,7 @@ mod warmth;
 pub(crate) use act::GRAVITY;
 pub use handed::Handed;
 pub(crate) use handed::{HandedLoad, Push};
+pub use matter::{ElasticMatter, elastic};
 
 use glam::DVec3;
 use intrados_scene::{Assembly, Frame, MemberKind, Scene};
@@ -348,9 +349,12 @@ pub fn prepare_within(
 }
 
 /// Edge of the largest brick in which the concrete of an assembly keeps its fracture energy, m;
-/// none where nothing is known of that concrete.
+/// none where nothing is known of that concrete, or where it is of none.
 #[must_use]
 pub fn largest_element(scene: &Scene, assembly: &Assembly) -> Option<f64> {
+    if elastic(assembly).is_some() {
+        return None;
+    }
     matter::properties(scene, &assembly.concrete).ok().map(|p| p.largest_element())
 }
 

@@ -148,6 +148,10 @@ impl<'m> System<'m> {
             let birth = model.bodies[hex.region as usize].birth;
             hex.nodes.iter().for_each(|&n| since[n as usize] = since[n as usize].min(birth));
         }
+        for shell in &mesh.shells {
+            let birth = model.bodies[shell.region as usize].birth;
+            shell.nodes.iter().for_each(|&n| since[n as usize] = since[n as usize].min(birth));
+        }
         let latest = |nodes: &[u32; 8]| {
             nodes.iter().map(|&n| since[n as usize]).fold(f64::NEG_INFINITY, f64::max)
         };
@@ -239,7 +243,7 @@ impl<'m> System<'m> {
         self.bear_thin(history, time);
     }
 
-    /// Whether a joint has its law and a brick on both sides.
+    /// Whether a joint has its law and a brick or a shell on both sides.
     fn joint_is_alive(&self, joint: usize, time: f64) -> bool {
         let region = self.model.mesh.interfaces[joint].region as usize;
         self.model.bodies[region].birth.max(self.joined[joint]) <= time

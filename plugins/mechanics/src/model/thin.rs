@@ -9,7 +9,10 @@ use glam::DVec3;
 
 use super::{Action, Elastic, Failure, History, Matter, System, Trial};
 use crate::{
-    element::{Element, quad, rod, shell::Shell},
+    element::{
+        Element, quad, rod,
+        shell::{Resultants, Shell},
+    },
     material::steel::{Bar, BarState},
     mesh::{ElementId, Mesh},
     sparse::{Connectivity, Kind, Place},
@@ -206,17 +209,40 @@ impl System<'_> {
         Ok(self.rod(rod, Trial::still(history, &warmth), &history.x)?.0)
     }
 
+    /// Stress in the middle of a shell's wall, around an axis and along it, Pa.
+    ///
+    /// # Errors
+    /// [`Failure::Element`] if it is folded.
+    pub(crate) fn wall_stress(
+        &self,
+        shell: usize,
+        axis: DVec3,
+        history: &History,
+    ) -> Result<[f64; 2], Failure> {
+        if !self.thin_is_alive(shell, history.time) {
+            return Ok([0.0; 2]);
+        }
+        let thickness = self.shell(shell)?.0.thickness;
+        let found = self.resultants(shell, [0.0; 2], history)?;
+        let [one, two, normal] = found.frame;
+        let [n11, n22, n12] = found.membrane;
+        let along = |way: DVec3| {
+            let [a, b] = [way.dot(one), way.dot(two)];
+            (n11 * a * a + n22 * b * b + 2.0 * n12 * a * b) / thickness
+        };
+        Ok([along(axis.cross(normal).normalize_or_zero()), along(axis)])
+    }
+
     /// Forces and moments of a shell at natural coordinates in a history, heat included.
     ///
     /// # Errors
     /// [`Failure::Element`] if it is folded.
-    #[cfg(test)]
     pub(crate) fn resultants(
         &self,
         shell: usize,
         [r, s]: [f64; 2],
         history: &History,
-    ) -> Result<crate::element::shell::Resultants, Failure> {
+    ) -> Result<Resultants, Failure> {
         let (element, elastic) = self.shell(shell)?;
         let [_, warmth] = self.warmth([history.time; 2]);
         let warm = self.thin_warmth(self.model.mesh.shells[shell].nodes, &warmth);

@@ -150,6 +150,12 @@ fn stresses(ui: &mut Ui, own: &MemberOutcome) {
             copied(ui, RichText::new(value));
             ui.end_row();
         }
+        if let Some(pipe) = own.pipe {
+            ui.label("steel pipe");
+            let [around, along] = [pipe.around_pa, pipe.along_pa].map(mpa);
+            copied(ui, RichText::new(format!("{around:.0} MPa around, {along:.0} along")));
+            ui.end_row();
+        }
     });
 }
 

@@ -391,6 +391,9 @@ impl Predictor {
                 let (monitored, unused) = monitoring::heard(scene, index, &one);
                 self.unmonitored.extend(unused);
                 let foretold = one.evidence(self.settings.profile.forecast_error);
+                if let (None, Some(stressed)) = (&foretold, &one.elastic) {
+                    self.fates[first + k] = Some(stressed.told());
+                }
                 self.told.extend(foretold.into_iter().chain(monitored).map(|e| (index, e)));
             }
         }

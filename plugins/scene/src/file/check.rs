@@ -696,7 +696,15 @@ impl Checker<'_> {
                 );
                 self.tendons(tendons, [s.depth_m / 2.0, s.top_width_m / 2.0]);
             }
-            Body::Tunnel { radius_m, length_m, segments, cushion_mm, inner_lining, ground } => {
+            Body::Tunnel {
+                radius_m,
+                length_m,
+                segments,
+                cushion_mm,
+                inner_lining,
+                pipe,
+                ground,
+            } => {
                 self.within("radius_m", *radius_m, 0.2, 100.0);
                 self.above("length_m", *length_m, 0.0, 10_000.0);
                 self.within("cushion_mm", *cushion_mm, 0.0, 1000.0);
@@ -713,10 +721,29 @@ impl Checker<'_> {
                 if let Some(l) = inner_lining {
                     self.at("inner_lining", |c| c.inner_lining(l, *radius_m, *length_m));
                 }
+                if let Some(p) = pipe {
+                    self.at("pipe", |c| c.pipe(p, *radius_m));
+                }
                 if let Some(g) = ground {
                     self.at("ground", |c| c.ground(g));
                 }
             }
+        }
+    }
+
+    fn pipe(&mut self, pipe: &Pipe, radius_m: f32) {
+        self.above("thickness_mm", pipe.thickness_mm, 0.0, 200.0);
+        self.within("cushion_mm", pipe.cushion_mm, 0.0, 1000.0);
+        self.within("cushion_mpa", pipe.cushion_mpa, 1e-3, 1e5);
+        if let Some(day) = pipe.at_days {
+            self.within("at_days", day, -1e6, 1e6);
+        }
+        if pipe.thickness_mm + pipe.cushion_mm > 100.0 * radius_m {
+            self.error(
+                "",
+                "RANGE",
+                "wall and cushion are thicker than a tenth of the radius: they are given in mm",
+            );
         }
     }
 
@@ -1043,6 +1070,10 @@ impl Checker<'_> {
         self.within("modulus_gpa", matter.modulus_gpa, 1e-3, 1000.0);
         self.within("poisson", matter.poisson, 0.0, 0.49);
         self.within("density_kg_m3", matter.density_kg_m3, 1.0, 25_000.0);
+        self.within("expansion_1e6_k", matter.expansion_1e6_k, 0.0, 200.0);
+        if let Some(strength) = matter.strength_mpa {
+            self.within("strength_mpa", strength, 0.1, 5000.0);
+        }
     }
 
     fn georeference(&mut self, place: &Georeference) {
@@ -1264,7 +1295,7 @@ impl Checker<'_> {
     fn place(&mut self, field: &str, place: &Place) {
         self.at(field, |c| match *place {
             Place::Start | Place::End | Place::Top | Place::Bottom | Place::Whole => {}
-            Place::Section(along) => {
+            Place::Section(along) | Place::Pipe(along) => {
                 c.within("", along, 0.0, 1.0);
             }
             Place::Surface { from, to, side_deg } => {
@@ -1346,6 +1377,9 @@ impl Checker<'_> {
             Action::Air { inside_k, outside_k } => {
                 c.within("inside_k", *inside_k, -100.0, 1500.0);
                 c.within("outside_k", *outside_k, -100.0, 1500.0);
+            }
+            Action::PipeTemperature { warmer_k } => {
+                c.within("warmer_k", *warmer_k, -200.0, 1500.0);
             }
             Action::Temperature { uniform_k, difference_k } => {
                 c.within("uniform_k", *uniform_k, -200.0, 1500.0);

@@ -110,6 +110,7 @@ fn times(scene: &SceneFile, member: &Member, action: &Action) -> Option<f32> {
         Action::SelfWeight
         | Action::Displacement { .. }
         | Action::Air { .. }
+        | Action::PipeTemperature { .. }
         | Action::Temperature { .. } => None,
     }
 }

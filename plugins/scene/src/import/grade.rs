@@ -39,22 +39,31 @@ const CLASSES: [(u32, u32); 15] = [
 /// Classes of DIN 1045 (1978), by cubes, and those of today that DIN 1045-1 put in their place.
 const GERMAN: [(&str, u32); 5] = [("B15", 12), ("B25", 20), ("B35", 30), ("B45", 35), ("B55", 45)];
 
-/// Words of materials that are no concrete, with what they are taken for: Young's modulus, GPa,
-/// Poisson's ratio, density, kg/m³. Words of reinforced concrete are taken out before.
+/// A material that is no concrete: words by which it goes; what it is taken for: Young's modulus,
+/// GPa, Poisson's ratio, density, kg/m³, thermal expansion, 1e-6/K; and what it bears in tension,
+/// MPa, where it is not brittle.
+type Other = (&'static [&'static str], [f32; 4], Option<f32>);
+
+/// Materials that are no concrete. Words of reinforced concrete are taken out before.
 ///
-/// Wood: C24 of EN 338, Poisson's ratio ours. Steel: EN 1993-1-1, 3.2.6; copper alike in stiffness
-/// to within a factor of two. Aluminium: EN 1999-1-1, 3.2.5. Glass: EN 572-1. Masonry: E = 1000 f_k
-/// of EN 1996-1-1, 3.7.2, with f_k = 5 MPa. Stone, soil, asphalt and insulation: ours.
-const OTHERS: [(&[&str], [f32; 3]); 9] = [
-    (&["wood", "timber", "holz", "glulam", "bois"], [11.0, 0.3, 420.0]),
-    (&["alumin"], [70.0, 0.3, 2700.0]),
-    (&["steel", "stahl", "acier", "acero", "metal", "copper"], [210.0, 0.3, 7850.0]),
-    (&["glass", "glas"], [70.0, 0.23, 2500.0]),
-    (&["masonry", "mauerwerk", "brick", "ziegel"], [5.0, 0.2, 1800.0]),
-    (&["stone", "granite", "naturstein"], [40.0, 0.25, 2600.0]),
-    (&["asphalt"], [3.0, 0.35, 2400.0]),
-    (&["soil"], [0.05, 0.3, 1900.0]),
-    (&["insulation", "dämmung"], [0.01, 0.2, 50.0]),
+/// Wood: C24 of EN 338, expansion and Poisson's ratio ours. Steel: S235 of EN 1993-1-1, 3.2.6, where
+/// its name says no other; copper alike in stiffness to within a factor of two. Aluminium: EN
+/// 1999-1-1, 3.2.5, and EN AW-6063 T6 of its table 3.2b. Glass: EN 572-1. Masonry: E = 1000 f_k of EN
+/// 1996-1-1, 3.7.2, with f_k = 5 MPa. Stone, soil, asphalt and insulation: ours.
+const OTHERS: [Other; 9] = [
+    (&["wood", "timber", "holz", "glulam", "bois"], [11.0, 0.3, 420.0, 5.0], Some(24.0)),
+    (&["alumin"], [70.0, 0.3, 2700.0, 23.0], Some(160.0)),
+    (
+        &["steel", "stahl", "acier", "acero", "metal", "copper"],
+        [210.0, 0.3, 7850.0, 12.0],
+        Some(235.0),
+    ),
+    (&["glass", "glas"], [70.0, 0.23, 2500.0, 9.0], None),
+    (&["masonry", "mauerwerk", "brick", "ziegel"], [5.0, 0.2, 1800.0, 6.0], None),
+    (&["stone", "granite", "naturstein"], [40.0, 0.25, 2600.0, 8.0], None),
+    (&["asphalt"], [3.0, 0.35, 2400.0, 25.0], None),
+    (&["soil"], [0.05, 0.3, 1900.0, 10.0], None),
+    (&["insulation", "dämmung"], [0.01, 0.2, 50.0, 10.0], None),
 ];
 const CONCRETES: [&str; 8] =
     ["stahlbeton", "reinforced", "concrete", "beton", "béton", "hormig", "calcestruzzo", "betong"];
@@ -154,10 +163,17 @@ pub(super) fn other_matter(materials: &[Matter]) -> Option<structure::Matter> {
     let is_concrete = |text: &str| CONCRETES.iter().any(|word| text.contains(word));
     let other = |m: &Matter| {
         let text = format!("{} {}", m.name, m.category).to_lowercase();
-        let is_it = |(words, _): &&(&[&str], [f32; 3])| words.iter().any(|w| text.contains(w));
-        let (_, [modulus_gpa, poisson, density_kg_m3]) = *OTHERS.iter().find(is_it)?;
-        let name = m.name.clone();
-        let matter = structure::Matter { name, modulus_gpa, poisson, density_kg_m3 };
+        let is_it = |(words, ..): &&Other| words.iter().any(|w| text.contains(w));
+        let (_, [modulus_gpa, poisson, density_kg_m3, expansion_1e6_k], strength) =
+            *OTHERS.iter().find(is_it)?;
+        let matter = structure::Matter {
+            name: m.name.clone(),
+            modulus_gpa,
+            poisson,
+            density_kg_m3,
+            expansion_1e6_k,
+            strength_mpa: strength.map(|least| of_class(&m.name).unwrap_or(least)),
+        };
         (!is_concrete(&text)).then_some(matter)
     };
     let concrete = |m: &Matter| is_concrete(&m.name.to_lowercase());
@@ -165,6 +181,22 @@ pub(super) fn other_matter(materials: &[Matter]) -> Option<structure::Matter> {
         return None;
     }
     materials.iter().find_map(other)
+}
+
+/// Yield strength of a structural steel by its name in EN 10025, bending strength of wood by its
+/// class in EN 338 (C for softwood, D for hardwood) or EN 14080 (GL), MPa: `S355J2`, `C24`, `GL28h`.
+fn of_class(name: &str) -> Option<f32> {
+    let words = name.split(|c: char| !c.is_alphanumeric());
+    let of_word = |word: &str| {
+        let (prefix, range) = [("S", 235..=960), ("GL", 20..=36), ("C", 14..=50), ("D", 18..=80)]
+            .into_iter()
+            .find(|(prefix, _)| word.starts_with(prefix))?;
+        let rest = word.strip_prefix(prefix)?;
+        let digits = rest.find(|c: char| !c.is_ascii_digit()).unwrap_or(rest.len());
+        let mpa: u32 = rest.get(..digits)?.parse().ok()?;
+        range.contains(&mpa).then_some(mpa as f32)
+    };
+    words.filter_map(of_word).next()
 }
 
 /// The grade of a bar: by its attribute, its materials, its names.
@@ -256,6 +288,22 @@ mod tests {
         };
         assert!(of("wood-generic") && of("Steel S355") && of("stone_granite_masonry"));
         assert!(!of("Stahlbeton - Ortbeton") && !of("steel-reinforced concrete") && !of("Solid"));
+    }
+
+    #[test]
+    fn what_bears_tension_says_how_much() {
+        let of = |name: &str| {
+            let matter = [Matter { name: name.into(), ..Matter::default() }];
+            other_matter(&matter).unwrap().strength_mpa
+        };
+        assert_eq!(
+            [of("wood-generic"), of("Holz C30"), of("Glulam GL28h")],
+            [24.0, 30.0, 28.0].map(Some)
+        );
+        assert_eq!(
+            [of("Steel S355J2"), of("Steel"), of("Masonry")],
+            [Some(355.0), Some(235.0), None]
+        );
     }
 
     #[test]

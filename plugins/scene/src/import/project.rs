@@ -327,11 +327,13 @@ fn detail_text(member: &Detail) -> String {
     if let Some(matter) = &found.other {
         let _ = write!(
             text,
-            ",\n            matter: (name: {}, modulus_gpa: {}, poisson: {}, density_kg_m3: {})",
+            ",\n            matter: (name: {}, modulus_gpa: {}, poisson: {}, density_kg_m3: {}, expansion_1e6_k: {}{})",
             quoted(&matter.name),
             matter.modulus_gpa,
             matter.poisson,
-            matter.density_kg_m3
+            matter.density_kg_m3,
+            matter.expansion_1e6_k,
+            matter.strength_mpa.map_or_else(String::new, |mpa| format!(", strength_mpa: {mpa}"))
         );
     }
     if let Some(tube) = &found.tube {
@@ -562,8 +564,16 @@ fn summary(folder: &Path, source: &Source, built: &Built, members: &[Detail]) ->
         });
     for (count, matter) in others.into_values() {
         notes.push(format!(
-            "{count} members are of {} (E some {} GPa, {} kg/m³), which is no concrete: they are computed as concrete all the same",
-            matter.name, matter.modulus_gpa, matter.density_kg_m3
+            "{count} members are of {} (E some {} GPa, {} kg/m³), which is no concrete: {}",
+            matter.name,
+            matter.modulus_gpa,
+            matter.density_kg_m3,
+            match matter.strength_mpa {
+                Some(mpa) => format!(
+                    "they are computed as elastic up to {mpa} MPa, which is assumed where the name says no class"
+                ),
+                None => "they are computed as concrete all the same".into(),
+            }
         ));
     }
     notes.extend(bare(members));

@@ -14,6 +14,8 @@ pub enum Place {
     End,
     /// The section at this share of the axis, 0 to 1.
     Section(f32),
+    /// Of a tunnel's steel pipe, the section at this share of the axis, 0 to 1.
+    Pipe(f32),
     /// The surface within these bounds; where they are equal a line across it, as of a bearing that
     /// lets a beam turn.
     Surface {
@@ -183,7 +185,13 @@ impl Action {
     /// Whether it is of a kind that is raised until a member fails: not weight, nor heat.
     #[must_use]
     pub fn can_be_raised(&self) -> bool {
-        !matches!(self, Self::SelfWeight | Self::Air { .. } | Self::Temperature { .. })
+        !matches!(
+            self,
+            Self::SelfWeight
+                | Self::Air { .. }
+                | Self::PipeTemperature { .. }
+                | Self::Temperature { .. }
+        )
     }
 }
 
@@ -242,6 +250,11 @@ pub enum Action {
         /// At all others, K.
         #[serde(default)]
         outside_k: f32,
+    },
+    /// The steel pipe of a tunnel is warmer than its concrete.
+    PipeTemperature {
+        /// K.
+        warmer_k: f32,
     },
     /// Warmer than when built.
     Temperature {

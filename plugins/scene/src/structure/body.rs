@@ -47,10 +47,10 @@ pub enum Body {
         tendons: Vec<Tendon>,
     },
     /// A round tunnel along +z: from outside in, ground, a ring of segments, a cushion layer, an
-    /// inner lining. The inner lining has the member's id, a segment `ID/R1/S1` (ring, segment,
+    /// inner lining, a steel pipe. The inner lining has the member's id, a segment `ID/R1/S1` (ring, segment,
     /// both from 1). At least one of `segments` and `inner_lining` is there.
     Tunnel {
-        /// Radius of the intrados, the innermost face, m.
+        /// Radius of the intrados, the innermost face of concrete, m.
         radius_m: f32,
         /// Along the axis, m.
         length_m: f32,
@@ -63,6 +63,9 @@ pub enum Body {
         /// Cast inside the segments.
         #[serde(default)]
         inner_lining: Option<InnerLining>,
+        /// Inside of the intrados: it takes the inner pressure, and hands on what it does not bear.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        pipe: Option<Pipe>,
         /// What lies around it; no mesh.
         #[serde(default)]
         ground: Option<Ground>,
@@ -293,6 +296,29 @@ fn relaxation() -> u8 {
 
 /// So many rings a tunnel has at most; its check asks for fewer.
 const MOST_RINGS: f32 = 20_000.0;
+
+/// A steel pipe inside of a tunnel, with a soft layer about it. No picture and no slice shows it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Pipe {
+    /// Of its wall, mm.
+    pub thickness_mm: f32,
+    /// Soft layer between the pipe and the intrados, mm: no tension, little friction.
+    #[serde(default)]
+    pub cushion_mm: f32,
+    /// Stress over strain of that layer across it, MPa; grouted or cast against the pipe, it does
+    /// not matter.
+    #[serde(default = "foam")]
+    pub cushion_mpa: f32,
+    /// When it is fitted, days; none: when the last pour bears.
+    #[serde(default)]
+    pub at_days: Option<f32>,
+}
+
+/// Of a foamed or bituminous sheet; tests on the product should replace it.
+fn foam() -> f32 {
+    5.0
+}
 
 /// Rings of precast segments.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -3,8 +3,9 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// What a member is of that is no concrete. It is computed as concrete all the same, and that is
-/// said wherever its concrete is named.
+/// What a member is of that is no concrete. What bears tension is computed as elastic up to its
+/// strength; what is brittle is computed as concrete all the same, and that is said wherever its
+/// concrete is named.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Matter {
@@ -16,6 +17,27 @@ pub struct Matter {
     pub poisson: f32,
     /// kg/m³.
     pub density_kg_m3: f32,
+    /// Thermal expansion, 1e-6/K; of wood along the grain.
+    #[serde(default = "as_concrete")]
+    pub expansion_1e6_k: f32,
+    /// Characteristic strength of what bears tension as it bears compression (metal, and wood along
+    /// the grain in bending), MPa; none: it is brittle.
+    #[serde(default)]
+    pub strength_mpa: Option<f32>,
+}
+
+/// EN 1992-1-1, 3.1.3 (5).
+fn as_concrete() -> f32 {
+    10.0
+}
+
+impl Matter {
+    /// What people call it, and as what it is computed.
+    #[must_use]
+    pub fn computed_as(&self, concrete: &str) -> String {
+        let law = if self.strength_mpa.is_some() { "elastic" } else { concrete };
+        format!("{}, computed as {law}", self.name)
+    }
 }
 
 /// A concrete that is no class of Eurocode 2.
@@ -24,15 +46,18 @@ pub struct Matter {
 pub struct Concrete {
     /// Name that members refer to.
     pub name: String,
-    /// Characteristic cylinder strength, MPa. What is not given follows from it by Eurocode 2.
+    /// Characteristic cylinder strength, MPa. What is not given follows from it by the code.
     pub fck_mpa: f32,
+    /// Whose rules give what is not given, creep, shrinkage and growth of strength.
+    #[serde(default)]
+    pub code: Code,
     /// Mean cylinder strength where it was measured, MPa; f_ck + 8 where it was not.
     #[serde(default)]
     pub fcm_mpa: Option<f32>,
     /// Mean tensile strength, MPa.
     #[serde(default)]
     pub fctm_mpa: Option<f32>,
-    /// Secant modulus, GPa.
+    /// Secant modulus, GPa; by Model Code 2010 the tangent at the origin.
     #[serde(default)]
     pub ecm_gpa: Option<f32>,
     /// Standard error of that modulus where it was measured, GPa; without it the modulus counts as
@@ -54,6 +79,16 @@ pub struct Concrete {
     /// Heat that it makes while it hardens; none: none is computed.
     #[serde(default)]
     pub hydration: Option<Hydration>,
+}
+
+/// Whose rules a concrete follows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+pub enum Code {
+    /// EN 1992-1-1: 3.1 and Annex B.
+    #[default]
+    Ec2,
+    /// fib Model Code 2010: 5.1, creep by 5.1.9.4 (basic and drying).
+    Mc2010,
 }
 
 /// Heat of hydration: Q(t) = cement · heat · (1 − exp(−t/time)), t at 20 °C.
