@@ -137,7 +137,7 @@ pub(crate) enum Command {
     /// Computes stress, creep and damage of members over their load history, or runs an Abaqus or
     /// CalculiX deck
     #[command(
-        after_help = "Examples:\n  intrados analyze column --out stress\n  intrados analyze tunnel --member T1 --element 0.3 --format json\n  intrados analyze bracket.inp --units mm,N --out stress\n\nWhat it does not do: bars and tendons of glTF members are used only where their nodes say how they run, as those of `intrados import` do (else it is plain concrete, with a warning); displacements are taken as small (near or beyond the load of buckling it warns or ends); a Gmsh mesh brings no materials or loads and is refused; bricks that grow in layers and local refinement of meshes are in the library and no scene asks for them."
+        after_help = "Examples:\n  intrados analyze column --out stress\n  intrados analyze tunnel --member T1 --element 0.3 --format json\n  intrados analyze beam --member B1 --fine 0.4..0.6 --out stress\n  intrados analyze bracket.inp --units mm,N --out stress\n\nWhat it does not do: bars and tendons of glTF members are used only where their nodes say how they run, as those of `intrados import` do (else it is plain concrete, with a warning); displacements are taken as small (near or beyond the load of buckling it warns or ends); a Gmsh mesh brings no materials or loads and is refused; bricks that grow in layers are in the library and no scene asks for them."
     )]
     Analyze(Analyze),
     /// Scans members with X-rays: projections, reconstructed slices, and the truth beside them; or
@@ -807,6 +807,13 @@ pub(crate) struct Analyze {
     /// Largest edge of an element, m, instead of one that suits the section
     #[arg(long, value_name = "M", value_parser = element)]
     pub(crate) element: Option<f64>,
+    /// Only what lies between two shares of a member's axis, in finer bricks and driven at its cuts
+    /// by the life of all of it: 0.4..0.6
+    #[arg(long, value_name = "FROM..TO", value_parser = stretch, conflicts_with = "to_failure")]
+    pub(crate) fine: Option<[f64; 2]>,
+    /// Largest edge of an element between them, m; half of the others' if absent
+    #[arg(long, value_name = "M", value_parser = element, requires = "fine")]
+    pub(crate) fine_element: Option<f64>,
     /// Largest unbalanced force over all that acts at which a step counts as in equilibrium; 1e-3
     /// of a scene, 1e-8 of a deck if absent
     #[arg(long, value_name = "R", value_parser = tolerance)]
@@ -845,6 +852,14 @@ fn years(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(years) if (0.0..=200.0).contains(&years) => Ok(years),
         _ => Err("give years between 0 and 200".into()),
+    }
+}
+
+fn stretch(text: &str) -> Result<[f64; 2], String> {
+    let ends = text.split_once("..").and_then(|(a, b)| Some([a.parse().ok()?, b.parse().ok()?]));
+    match ends {
+        Some([from, to]) if 0.0 <= from && from < to && to <= 1.0 => Ok([from, to]),
+        _ => Err("give two shares of the axis that rise from 0 to 1, such as 0.4..0.6".into()),
     }
 }
 

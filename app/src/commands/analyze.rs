@@ -12,7 +12,7 @@ use intrados_mechanics::{
     frame::Whole,
     linear::concerns,
     material::law::Cracks,
-    member::{Along, MemberError, Meshing, Prepared, prepare_within},
+    member::{Along, Axes, MemberError, Meshing, Prepared, Stretch, prepare_within},
     mesh::voxel::VoxelError,
     model::{self, MarchSettings, Regularisation},
     read::{self, ReadError},
@@ -69,6 +69,8 @@ struct Work {
     /// Names of the scene's loads that may be raised until members fail.
     loads: Vec<String>,
     prepared: Vec<Prepared>,
+    /// Of one member of which a stretch is wanted: all of it in the stretch's bricks, and its axes.
+    fine: Option<(Prepared, Axes)>,
     /// Beginnings of the names of their files, by id.
     names: BTreeMap<String, String>,
 }
@@ -85,7 +87,7 @@ pub(crate) fn run(session: &Session, args: &args::Analyze) -> Result<Outcome, Fa
         _ => scene(session, args)?,
     };
     if args.regularise == Regularise::Gradient {
-        work.prepared.iter_mut().for_each(|p| {
+        work.models().for_each(|p| {
             p.model.regularisation = Regularisation::Gradient { length: args.length }
         });
     }
@@ -95,12 +97,15 @@ pub(crate) fn run(session: &Session, args: &args::Analyze) -> Result<Outcome, Fa
             CrackLaw::Diffuse => Cracks::Diffuse,
             CrackLaw::Planes => Cracks::Planes,
         };
-        work.prepared.iter_mut().for_each(|p| p.model.crack(cracks));
+        work.models().for_each(|p| p.model.crack(cracks));
     }
     if let Some(load) = &args.to_failure {
         work.raise(load)?;
     }
     let begin = cpu_seconds();
+    if let Some(between) = args.fine {
+        work.stretch(session, args, between)?;
+    }
     let Some(out) = &args.out else {
         let lives = work.prepared.iter().enumerate().map(|(i, prepared)| {
             let _progress = session.watch(work.label(i));
@@ -114,6 +119,8 @@ pub(crate) fn run(session: &Session, args: &args::Analyze) -> Result<Outcome, Fa
     let key = (
         &work.hash,
         args.element,
+        args.fine,
+        args.fine_element,
         args.tolerance,
         args.regularise,
         args.length,
@@ -202,6 +209,39 @@ impl Work {
         MarchSettings { tolerance: args.tolerance.unwrap_or(usual.tolerance), ..usual }
     }
 
+    /// All that is going to be computed.
+    fn models(&mut self) -> impl Iterator<Item = &mut Prepared> {
+        self.prepared.iter_mut().chain(self.fine.as_mut().map(|(fine, _)| fine))
+    }
+
+    /// Computes all of a member, and puts in its place what lies `between` two shares of its axis.
+    fn stretch(
+        &mut self,
+        session: &Session,
+        args: &args::Analyze,
+        between: [f64; 2],
+    ) -> Result<(), Failure> {
+        let ([whole], Some((fine, axes))) = (&self.prepared[..], &self.fine) else {
+            return Err(Failure::Usage(
+                "--fine is for one member of a scene: name it with --member".into(),
+            ));
+        };
+        let _progress = session.watch(format!("{}, all of it", whole.id));
+        let stretch = Stretch::of(whole, fine, axes, between);
+        let mut driven = stretch.map_err(|why| Failure::BadInput(why.to_string()))?.driven();
+        let (life, _) = analyze(whole, self.settings(args), &session.job, &mut driven)
+            .map_err(|why| refused(args, whole, why))?;
+        let mut part = driven.prepared();
+        if !life.complaint.is_empty() {
+            part.warnings.push(format!(
+                "all of it ended early, and the stretch is followed as far: {}",
+                life.complaint
+            ));
+        }
+        self.prepared = vec![part];
+        Ok(())
+    }
+
     /// Raises a load of the scene, or all that may be, until members fail.
     fn raise(&mut self, load: &str) -> Result<(), Failure> {
         if !self.is_scene {
@@ -284,7 +324,7 @@ fn scene(session: &Session, args: &args::Analyze) -> Result<Work, Failure> {
     };
     let meshing = Meshing { element: args.element };
     let chosen = structure.assemblies.iter().filter(|a| wanted(&a.id));
-    let made = |a: &Assembly| {
+    let made = |a: &Assembly, meshing: Meshing| {
         let handed = handed(&a.id);
         if args.whole && handed.is_none() {
             let why = format!("member {}: it is no part of what bears as a whole", a.id);
@@ -292,12 +332,23 @@ fn scene(session: &Session, args: &args::Analyze) -> Result<Work, Failure> {
         }
         Ok(prepare_within(&scene, a, handed, meshing, &session.job)?)
     };
-    let prepared = chosen.map(made).collect::<Result<Vec<_>, Failure>>()?;
+    let chosen: Vec<&Assembly> = chosen.collect();
+    let prepared = chosen.iter().map(|a| made(a, meshing)).collect::<Result<Vec<_>, Failure>>()?;
+    let fine = match (args.fine, &chosen[..], &prepared[..]) {
+        (Some(_), [one], [whole]) => {
+            let mesh = &whole.model.mesh;
+            let longest = (0..mesh.hexes.len() as u32).map(|hex| mesh.longest(hex));
+            let half = 0.5 * longest.fold(0.0, f64::max);
+            let meshing = Meshing { element: Some(args.fine_element.unwrap_or(half)) };
+            Some((made(one, meshing)?, Axes::of(&one.frame)))
+        }
+        _ => None,
+    };
     let names =
         known.iter().map(|id| (*id).to_owned()).zip(file_names(&Vec::from_iter(&known))).collect();
     let loads = structure.loads.iter().filter(|l| l.action.can_be_raised());
     let loads = loads.map(|l| l.name.clone()).collect();
-    Ok(Work { name: scene.name, hash: scene.hash, is_scene: true, loads, prepared, names })
+    Ok(Work { name: scene.name, hash: scene.hash, is_scene: true, loads, prepared, fine, names })
 }
 
 /// The assembly that somebody calls so, by id or name.
@@ -387,7 +438,15 @@ fn deck(args: &args::Analyze, kind: &str) -> Result<Read, Failure> {
         Case::new(deck).map_err(|why| Failure::BadInput(format!("{}: {why}", path.display())))?;
     let prepared = vec![case.prepared(&name)];
     let names = prepared.iter().map(|p| (p.id.clone(), file_name(&p.id))).collect();
-    Ok(Read::Members(Work { prepared, names, name, hash, is_scene: false, loads: Vec::new() }))
+    Ok(Read::Members(Work {
+        prepared,
+        fine: None,
+        names,
+        name,
+        hash,
+        is_scene: false,
+        loads: Vec::new(),
+    }))
 }
 
 /// A life with its files, and what is seen of it from outside.
