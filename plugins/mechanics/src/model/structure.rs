@@ -1,6 +1,6 @@
 //! A model made ready to be computed: which unknowns it has, what it resists, what acts on it.
 
-use std::sync::Arc;
+use std::{collections::BTreeMap, sync::Arc};
 
 use glam::DVec3;
 use intrados_stage::Job;
@@ -353,16 +353,16 @@ impl<'m> System<'m> {
     pub fn prescribed(&self, time: f64) -> Vec<(u32, u8, f64)> {
         let holds = self.model.holds.iter().map(|&(node, component)| (node, component, 0.0));
         let mut all: Vec<_> = holds.chain(self.slips.held()).collect();
+        // Loads add up, also those that move one node.
+        let mut moved: BTreeMap<(u32, u8), f64> = BTreeMap::new();
         for load in &self.model.loads {
-            if let Action::Displacement(values) = &load.action {
-                let factor = load.factor(time);
-                all.extend(
-                    values
-                        .iter()
-                        .map(|&(node, component, value)| (node, component, factor * value)),
-                );
+            let Action::Displacement(values) = &load.action else { continue };
+            let factor = load.factor(time);
+            for &(node, component, value) in values {
+                *moved.entry((node, component)).or_default() += factor * value;
             }
         }
+        all.extend(moved.into_iter().map(|((node, component), value)| (node, component, value)));
         all
     }
 
