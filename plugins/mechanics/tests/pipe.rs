@@ -22,14 +22,18 @@ const STEEL: f64 = 210e9;
 const CONCRETE: f64 = 30e9;
 
 /// What becomes of the pipe of a tunnel whose ends, and those of the pipe, stay where they are
-/// along it, under a load from day 10 to 11; its concrete is elastic.
+/// along it, under a load from day 10 to 11; its concrete is elastic. The start of the lining is held
+/// in all directions where the pipe hands nothing on to it.
 fn pipe(cushion_mpa: f64, action: &str, holds_end: bool) -> PipeOutcome {
     let hold = |place: &str| {
         format!("(member: \"T\", place: {place}, hold: Directions(x: false, y: false, z: true))")
     };
     let mut places = vec!["Start", "End", "Pipe(0)"];
     places.extend(holds_end.then_some("Pipe(1)"));
-    let supports: Vec<String> = places.into_iter().map(hold).collect();
+    let mut supports: Vec<String> = places.into_iter().map(hold).collect();
+    if cushion_mpa < 1.0 {
+        supports[0] = "(member: \"T\", place: Start, hold: Fixed)".into();
+    }
     let text = format!(
         "(schema: \"intrados.scene/1\", members: [(id: \"T\", at: (0, 0, 0), concrete: \"C30/37\", body: Tunnel(radius_m: {INNER}, length_m: {LENGTH}, \
          inner_lining: (thickness_m: {}), pipe: (thickness_mm: {}, cushion_mm: {}, cushion_mpa: {cushion_mpa}), \

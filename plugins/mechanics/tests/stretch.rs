@@ -18,7 +18,7 @@ fn beam(line: f64) -> Scene {
          reinforcement: (cover_mm: 30, bars: [Row(side_deg: 180, count: 4, diameter_mm: 20)])))], \
          supports: [(member: \"B\", place: Surface(from: 0, to: 0, side_deg: 180), hold: Fixed), \
          (member: \"B\", place: Surface(from: 1, to: 1, side_deg: 180), hold: Directions(x: false, y: true, z: true))], \
-         loads: [(name: \"weight\", action: SelfWeight), (name: \"line\", action: Line(force_kn_m: (0, -{line}, 0)), history: [(20, 0), (28, 1)])])"
+         loads: [(name: \"weight\", action: SelfWeight), (name: \"line\", action: Line(force_kn_m: (0, -{line}, 0)), history: [(4, 0), (5, 1)])])"
     );
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("beam.ron");
