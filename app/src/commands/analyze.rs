@@ -12,12 +12,13 @@ use intrados_mechanics::{
     frame::Whole,
     linear::concerns,
     material::law::Cracks,
-    member::{Along, Axes, MemberError, Meshing, Prepared, Stretch, prepare_within},
+    member::{Along, Axes, MemberError, Meshing, Prepared, prepare_within},
     mesh::voxel::VoxelError,
     model::{self, MarchSettings, Regularisation},
     read::{self, ReadError},
     skin::{Looking, Seen},
     strength::{CurvePoint, Strength},
+    stretch::Stretch,
 };
 use intrados_scene::{Assembly, Scene, SurfaceDamage, SurfaceFile};
 use intrados_stage::{
@@ -70,7 +71,7 @@ struct Work {
     loads: Vec<String>,
     prepared: Vec<Prepared>,
     /// Of one member of which a stretch is wanted: all of it in the stretch's bricks, and its axes.
-    fine: Option<(Prepared, Axes)>,
+    fine: Option<Box<(Prepared, Axes)>>,
     /// Beginnings of the names of their files, by id.
     names: BTreeMap<String, String>,
 }
@@ -211,7 +212,7 @@ impl Work {
 
     /// All that is going to be computed.
     fn models(&mut self) -> impl Iterator<Item = &mut Prepared> {
-        self.prepared.iter_mut().chain(self.fine.as_mut().map(|(fine, _)| fine))
+        self.prepared.iter_mut().chain(self.fine.as_mut().map(|fine| &mut fine.0))
     }
 
     /// Computes all of a member, and puts in its place what lies `between` two shares of its axis.
@@ -221,7 +222,7 @@ impl Work {
         args: &args::Analyze,
         between: [f64; 2],
     ) -> Result<(), Failure> {
-        let ([whole], Some((fine, axes))) = (&self.prepared[..], &self.fine) else {
+        let ([whole], Some((fine, axes))) = (&self.prepared[..], self.fine.as_deref()) else {
             return Err(Failure::Usage(
                 "--fine is for one member of a scene: name it with --member".into(),
             ));
@@ -340,7 +341,7 @@ fn scene(session: &Session, args: &args::Analyze) -> Result<Work, Failure> {
             let longest = (0..mesh.hexes.len() as u32).map(|hex| mesh.longest(hex));
             let half = 0.5 * longest.fold(0.0, f64::max);
             let meshing = Meshing { element: Some(args.fine_element.unwrap_or(half)) };
-            Some((made(one, meshing)?, Axes::of(&one.frame)))
+            Some(Box::new((made(one, meshing)?, Axes::of(&one.frame))))
         }
         _ => None,
     };

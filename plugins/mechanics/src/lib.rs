@@ -7,6 +7,7 @@ pub mod member;
 pub mod plugin;
 pub mod skin;
 pub mod strength;
+pub mod stretch;
 
 // What every body is computed with.
 pub(crate) mod heat;

@@ -5,8 +5,9 @@
 
 use intrados_mechanics::{
     analysis::{Observer, analyze},
-    member::{Axes, Meshing, Prepared, Stretch, prepare},
+    member::{Axes, Meshing, Prepared, prepare},
     model::{Failure, History, MarchSettings, Point, Step, System},
+    stretch::Stretch,
 };
 use intrados_scene::Scene;
 use intrados_stage::Job;

@@ -13,14 +13,12 @@ mod handed;
 pub(crate) mod imported;
 pub(crate) mod matter;
 mod steel;
-mod stretch;
 mod warmth;
 
 pub(crate) use act::GRAVITY;
 pub use handed::Handed;
 pub(crate) use handed::{HandedLoad, Push};
 pub use matter::{ElasticMatter, elastic};
-pub use stretch::{Driven, Stretch, StretchError};
 
 use glam::DVec3;
 use intrados_scene::{Assembly, Frame, MemberKind, Scene};

@@ -6,10 +6,10 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use glam::DVec3;
 
-use super::{Axes, Part, Prepared};
 use crate::{
     analysis::Observer,
     element::hex8,
+    member::{Axes, Part, Prepared},
     mesh::{Hex, HexFace, Host, Locator, Mesh},
     model::{
         Action, Failure, Gauge, Ground, History, Load, Model, Point, Rust, Steel, SteelKind, Step,
@@ -280,8 +280,8 @@ impl Renumbered {
             ));
         }
         let kind = match &steel.kind {
-            SteelKind::Bar(bar) => SteelKind::Bar(bar.clone()),
-            SteelKind::Stressed(bar, stress) => SteelKind::Stressed(bar.clone(), of(stress)),
+            SteelKind::Bar(bar) => SteelKind::Bar(*bar),
+            SteelKind::Stressed(bar, stress) => SteelKind::Stressed(*bar, of(stress)),
             SteelKind::Tendon(tendon) => {
                 let ends = [0, steel.pieces.len() - 1].map(|end| kept.contains(&end));
                 if !tendon.bonded || ends.contains(&true) {
