@@ -110,7 +110,7 @@ pub(crate) enum Command {
     Import(Import),
     /// Puts evidence beside a scene: CT slices, a table (CSV), a load test, or a single finding
     #[command(
-        after_help = "Examples:\n  intrados attach bridge P1 half_cell.csv --face front --date 2026-05-03\n  intrados attach bridge B1 --load-test truck --force-kn 100 --along 0.5\n  intrados attach bridge B1 gauges.csv --unit ue --test truck\n  intrados attach bridge P1 core_*.tif --pixel-mm 0.05 --along 0.3 --face front --depth-mm 30 --diameter-mm 100\n  intrados attach bridge P1 --crack 0.3 --course along --along 0.3,0.5 --face front\n\nA table's columns tell what it holds: mV, cover_mm, rebound, velocity_m_s, carbonation_mm, depth_mm with chloride_percent_cement (or chloride_percent_concrete), or gauge with value (and --unit); beside these along, face, angle_deg, height_m, date, std_error, test. Gauges have along, face or angle_deg, and depth_mm: one that is not known yet is defined so (ue, m/m: strain along the axis; mm, m: displacement, upwards positive).\nFiles are copied into evidence/ beside the scene, entries written into evidence.ron, which may be edited by hand as well. Nothing is written where anything is wrong."
+        after_help = "Examples:\n  intrados attach bridge P1 half_cell.csv --face front --date 2026-05-03\n  intrados attach bridge B1 --load-test truck --force-kn 100 --along 0.5\n  intrados attach bridge B1 gauges.csv --unit ue --test truck\n  intrados attach bridge P1 core_*.tif --pixel-mm 0.05 --along 0.3 --face front --depth-mm 30 --diameter-mm 100\n  intrados attach bridge P1 --crack 0.3 --course along --along 0.3,0.5 --face front\n\nA table's columns tell what it holds: mV, cover_mm, rebound, velocity_m_s, carbonation_mm, depth_mm with chloride_percent_cement (or chloride_percent_concrete), or gauge with value (and a column unit or --unit); beside these along, face, angle_deg, height_m, date, std_error, test. Gauges have along, face or angle_deg, and depth_mm: one that is not known yet is defined so (ue, m/m: strain along the axis; mm, m: displacement, upwards positive).\nFiles are copied into evidence/ beside the scene, entries written into evidence.ron, which may be edited by hand as well. Nothing is written where anything is wrong."
     )]
     Attach(Box<Attach>),
     /// Takes evidence away again, or lists what is there
@@ -386,7 +386,7 @@ pub(crate) struct PlaceArgs {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "What a file does not say itself")]
 pub(crate) struct FileArgs {
-    /// Unit of the column `value`: of gauges ue, m/m, mm, m or MPa
+    /// Unit of the column `value`, unless a column `unit` says it: of gauges ue, m/m, mm, m or MPa
     #[arg(long, value_name = "UNIT", requires = "files", conflicts_with = "finding")]
     pub(crate) unit: Option<String>,
     /// What the column `value` holds, where the table names no gauges

@@ -45,7 +45,7 @@ pub fn normalised(
 /// concrete; pores of masked slices are paler.
 const OUTSIDE: f32 = 0.4;
 /// Width of the blurred edge between body and air, pixels.
-const RIM: f32 = 3.0;
+pub(crate) const RIM: f32 = 3.0;
 /// Half the width of the mouths of pores that are closed, pixels; a bar is no thicker.
 const MOUTH: f32 = 8.0;
 /// Grey of metal, relative to sound concrete.

@@ -94,7 +94,8 @@ impl DetectSettings {
             min_pixels: 12,
             ..crack::CrackSettings::default()
         };
-        Self { method: Method::Members, chance: 0.6, crack, ..Self::default() }.in_members()
+        Self { method: Method::Members, chance: 0.6, chance_error: 0.1, crack, ..Self::default() }
+            .in_members()
     }
 
     /// The same for slices of members: what is shorter than the usual largest grain (16 mm) cracks

@@ -20,6 +20,9 @@ const PLANTINGS: u64 = 200;
 /// Their seeds come after this: by the first two hundred it was found that pores were counted as
 /// the width of cracks.
 const AFTER: u64 = 1000;
+/// The same of scans: by 1 to 40 and 1001 to 1037 it was found how large pores look that a slice
+/// only grazes.
+const AFTER_OF_SCANS: u64 = 1100;
 
 /// A column of .4 × .4 m: cores of it are drawn with 100 mm, or its whole sections with their bars.
 const COLUMN: &str = r#"(schema: "intrados.scene/1", members: [(
@@ -119,9 +122,9 @@ type Plant = fn(&Dice) -> Planted;
 type Says = fn(&SliceReading, &Planted) -> (Estimate, f64);
 
 /// Prints and returns the shares that intervals of ± 1.96 standard errors hold.
-fn held(name: &str, scene: &Scene, plant: Plant, says: &[(&str, Says)]) -> Vec<f64> {
+fn held(name: &str, scene: &Scene, after: u64, plant: Plant, says: &[(&str, Says)]) -> Vec<f64> {
     let mut sums = vec![[0.0; 4]; says.len()];
-    for number in AFTER + 1..=AFTER + PLANTINGS {
+    for number in after + 1..=after + PLANTINGS {
         let dice = Dice(Key::new(number, 0x51), 0.into());
         let planted = plant(&dice);
         let slice = read(scene, &planted, dice.span(2.0, 4.0), number);
@@ -210,8 +213,8 @@ fn drawn(size: u32, pixel_mm: f64) -> Scene {
 #[test]
 #[ignore = "two minutes: four hundred slices are drawn and read"]
 fn intervals_of_ct_hold_what_was_planted() {
-    let cores = held("cores", &drawn(400, 0.25), pores_and_cracks, &[POROSITY, DAMAGE]);
-    let sections = held("sections", &drawn(500, PIXEL), rust_and_spalls, &[BARS, OUTLINE]);
+    let cores = held("cores", &drawn(400, 0.25), AFTER, pores_and_cracks, &[POROSITY, DAMAGE]);
+    let sections = held("sections", &drawn(500, PIXEL), AFTER, rust_and_spalls, &[BARS, OUTLINE]);
     for share in [cores[1], sections[0]] {
         assert!((0.90..=0.99).contains(&share), "{cores:?} {sections:?}");
     }
@@ -223,9 +226,10 @@ fn intervals_of_ct_hold_what_was_planted() {
 #[test]
 #[ignore = "ten minutes and more: four hundred scans are simulated and read"]
 fn intervals_of_scans_hold_what_was_planted() {
-    let pores = held("scans", &scene(SPECIMEN), pores, &[POROSITY, DAMAGE]);
-    let bars = held("scans with bars", &scene(&with_bars()), rust, &[BARS]);
-    // Where edges of bars lie, and what no slice shows, is known less well than here. Porosity is
-    // missed where there is little air (docs/results.md), and printed.
-    assert!(pores[1] >= 0.90 && bars[0] >= 0.90, "{pores:?} {bars:?}");
+    let after = AFTER_OF_SCANS;
+    let pores = held("scans", &scene(SPECIMEN), after, pores, &[POROSITY, DAMAGE]);
+    let bars = held("scans with bars", &scene(&with_bars()), after, rust, &[BARS]);
+    // Where edges of bars lie, what no slice shows, and whether a face was cast or sawn, is known
+    // less well than here.
+    assert!(pores.iter().chain(&bars).all(|share| *share >= 0.90), "{pores:?} {bars:?}");
 }

@@ -5,6 +5,7 @@ mod bcf;
 mod document;
 mod html;
 mod ifc;
+mod labels;
 mod model;
 pub mod network;
 pub mod pdf;

@@ -6,10 +6,13 @@ use intrados_damage::{
     verdict::Basis,
     zone::{ZONES, middle},
 };
-use intrados_predict::MemberPrediction;
+use intrados_predict::{Defect, MemberPrediction};
 use intrados_stage::Estimate;
 
-use crate::words::word;
+use crate::{
+    labels::{self, Area, Mark},
+    words::word,
+};
 
 /// Diameters of pores in classes of equal ratio (√2), with axes.
 pub(super) fn histogram(diameters: &[f64]) -> String {
@@ -350,49 +353,71 @@ pub(super) fn map(m: &MemberPrediction, length: f64) -> String {
         0.5 * (left + right),
         h - 2.0
     );
-    for (number, defect) in m.defects.iter().enumerate() {
-        let Some([from, to]) = defect.along else { continue };
+    let metre = (right - left) / length.max(1e-3);
+    let mark = |defect: &Defect| {
+        let [from, to] = defect.along?;
         let middle = [x(0.5 * (from + to)), defect.angle_deg.map_or(beneath, y)];
-        let half = 0.5 * (x(to) - x(from));
-        // Metres along as they are; across, the same size, since how far it is around is not known.
-        let metre = (right - left) / length.max(1e-3);
-        let side = defect.area_m2.map_or(0.0, f64::sqrt) * metre;
-        let long = defect.length_m.unwrap_or(0.3) * metre;
-        let [dx, dy] = match defect.kind {
-            "crack along" => [half.max(0.5 * long), 0.0],
-            "diagonal crack" => [0.35 * long, 0.35 * long],
-            _ if defect.area_m2.is_none() => [half, (0.5 * long).clamp(6.0, 40.0)],
-            _ => [half.max(0.5 * side).max(4.0), (0.5 * side).clamp(4.0, 40.0)],
-        };
+        let [dx, dy] = half_sides(defect, 0.5 * (x(to) - x(from)), metre);
+        let [first, last] = [(middle[0] - dx).max(left), (middle[0] + dx).min(right)];
         // What goes round from 360° to 0° is cut there, and the member ends at its ends.
         let [low, high] = [(middle[1] - dy).max(top), (middle[1] + dy).min(beneath + 6.0)];
-        let [first, last] = [(middle[0] - dx).max(left), (middle[0] + dx).min(right)];
-        let _ = match defect.area_m2 {
-            Some(_) => write!(
+        Some(match defect.area_m2 {
+            Some(_) => Mark::Box(Area {
+                low: [first, low],
+                high: [last.max(first + 2.0), high.max(low + 2.0)],
+            }),
+            None => Mark::Line([first, high], [last, low]),
+        })
+    };
+    let marks = m.defects.iter().enumerate().filter_map(|(n, d)| Some((n + 1, mark(d)?)));
+    let (numbers, marks): (Vec<usize>, Vec<Mark>) = marks.unzip();
+    let size = |number: usize| [DIGIT[0] * number.to_string().len() as f64, DIGIT[1]];
+    let sized: Vec<_> = marks.iter().zip(&numbers).map(|(mark, n)| (*mark, size(*n))).collect();
+    marks.iter().for_each(|mark| draw(&mut svg, mark));
+    let within = Area { low: [left, 2.0], high: [right, beneath + 8.0] };
+    for (number, label) in numbers.iter().zip(labels::place(&sized, &within)) {
+        if let Some([[x1, y1], [x2, y2]]) = label.leader {
+            let _ = write!(
                 svg,
-                "<rect x=\"{:.1}\" y=\"{low:.1}\" width=\"{:.1}\" height=\"{:.1}\" class=\"area\"/>",
-                first,
-                (last - first).max(2.0),
-                (high - low).max(2.0)
-            ),
-            None => write!(
-                svg,
-                "<line x1=\"{:.1}\" y1=\"{:.1}\" x2=\"{:.1}\" y2=\"{:.1}\" class=\"crack\"/>",
-                first,
-                middle[1] + dy,
-                last,
-                middle[1] - dy
-            ),
-        };
-        let _ = write!(
-            svg,
-            "<text x=\"{:.1}\" y=\"{:.1}\">{}</text>",
-            (last + 3.0).min(right - 4.0),
-            middle[1] + 4.0,
-            number + 1
-        );
+                "<line x1=\"{x1:.1}\" y1=\"{y1:.1}\" x2=\"{x2:.1}\" y2=\"{y2:.1}\" class=\"leader\"/>"
+            );
+        }
+        let (at, base) = (label.area.low[0], label.area.high[1] - 0.5);
+        let _ = write!(svg, "<text x=\"{at:.1}\" y=\"{base:.1}\" class=\"no\">{number}</text>");
     }
     svg + "</svg>"
+}
+
+/// Width and height of a digit of the maps, of 11 pixels and bold.
+const DIGIT: [f64; 2] = [6.8, 9.0];
+
+/// Half of what a defect measures on a map, along and across, of which `half` is known along, in
+/// pixels. Metres along are as they are; across, the same size, since how far it is around is not
+/// known.
+fn half_sides(defect: &Defect, half: f64, metre: f64) -> [f64; 2] {
+    let side = defect.area_m2.map_or(0.0, f64::sqrt) * metre;
+    let long = defect.length_m.unwrap_or(0.3) * metre;
+    match defect.kind {
+        "crack along" => [half.max(0.5 * long), 0.0],
+        "diagonal crack" => [0.35 * long, 0.35 * long],
+        _ if defect.area_m2.is_none() => [half, (0.5 * long).clamp(6.0, 40.0)],
+        _ => [half.max(0.5 * side).max(4.0), (0.5 * side).clamp(4.0, 40.0)],
+    }
+}
+
+fn draw(svg: &mut String, mark: &Mark) {
+    let _ = match mark {
+        Mark::Box(Area { low: [x, y], high: [right, bottom] }) => write!(
+            svg,
+            "<rect x=\"{x:.1}\" y=\"{y:.1}\" width=\"{:.1}\" height=\"{:.1}\" class=\"area\"/>",
+            right - x,
+            bottom - y
+        ),
+        Mark::Line([x1, y1], [x2, y2]) => write!(
+            svg,
+            "<line x1=\"{x1:.1}\" y1=\"{y1:.1}\" x2=\"{x2:.1}\" y2=\"{y2:.1}\" class=\"crack\"/>"
+        ),
+    };
 }
 
 #[cfg(test)]

@@ -190,7 +190,7 @@ fn faults_are_named_with_their_place_and_remedy() {
         (item("shows: Rust(area_m2: 0)"), "evidence.ron: items[0].shows.area_m2", "above 0"),
         ("tables: [(file: \"none.csv\", member: \"C1\", name: \"t\")],".into(), "evidence.ron: tables[0].file: none.csv", "no such file"),
         ("tables: [(file: \"t.csv\", member: \"C1\", name: \"t\", unit: \"kN\")],".into(), "evidence.ron: tables[0].unit", "ue, m/m"),
-        ("tables: [(file: \"t.csv\", member: \"C1\", name: \"t\", kind: HalfCell)],".into(), "evidence.ron: tables[0].unit", "mV or V"),
+        ("tables: [(file: \"t.csv\", member: \"C1\", name: \"t\", kind: HalfCell, unit: \"mm\")],".into(), "evidence.ron: tables[0].unit", "mV or V"),
         ("slices: [(member: \"C1\", slices: [])],".into(), "evidence.ron: slices[0].slices", "Files"),
         ("slices: [(member: \"C1\", slices: [Drawn(name: \"d\", count: 1, size: 64, pixel_mm: 1)])],".into(), "evidence.ron: slices[0].slices[0]", "no evidence"),
         ("slices: [(member: \"C1\", slices: [Files(name: \"d\", images: [\"no.tif\"])])],".into(), "evidence.ron: slices[0]: no.tif", "check the path"),
@@ -317,6 +317,31 @@ fn gauges_are_read_in_their_units() {
     assert!((plain.structure.readings[0].std_error - 2e-6).abs() < 1e-18);
 }
 
+/// A table of strains and movements says the unit of each row; what it does not say is said of all.
+#[test]
+fn a_column_of_units_is_read_row_by_row() {
+    let text = "gauge,value,unit,std_error,along,face\nSG1,41.5,µε,1,,\nSG1,1e-5,m/m,,,\n\
+                LV1,-1.5,mm,0.1,0.5,Front\n";
+    let readings = table("", text).load().unwrap().structure.readings.clone();
+    let near = |a: f64, b: f64| (a / b - 1.0).abs() < 1e-9;
+    let expected = [(41.5e-6, 1e-6), (1e-5, 1e-6), (-1.5e-3, 1e-4)];
+    for (reading, (value, error)) in readings.iter().zip(expected) {
+        assert!(near(reading.value, value) && near(reading.std_error, error), "{reading:?}");
+    }
+    assert_eq!(readings.len(), 3);
+    let of_all = table("unit: \"ue\",", "gauge,value,unit\nSG1,5,\nSG1,6,με\n");
+    assert_eq!(of_all.load().unwrap().structure.readings.len(), 2);
+    let shows = |fields: &str, text: &str| -> Vec<Shows> {
+        table(fields, text).observations().into_iter().map(|o| o.shows).collect()
+    };
+    let covers = shows("kind: Cover,", "value,unit\n3.2,cm\n35,mm\n");
+    assert_eq!(covers, shows("", "cover_mm,unit\n32,mm\n35,\n"));
+    assert_eq!(shows("kind: Rebound,", "value,unit\n38,\n"), shows("", "rebound\n38\n"));
+    let chloride = "depth_mm,chloride_percent_cement,unit\n5,1,%\n15,0.5,% of cement\n";
+    let profile = table("", chloride).observations();
+    assert_eq!(profile.iter().map(|o| o.name.as_str()).collect::<Vec<_>>(), ["t 1"]);
+}
+
 /// Where a gauge is may be said in its table; then nobody need define it elsewhere.
 #[test]
 fn gauges_are_defined_by_the_places_of_their_readings() {
@@ -399,6 +424,33 @@ fn faults_of_tables_are_named_with_line_and_column() {
         ("kind: Cover, unit: \"mm\",", b"mV\n-300\n", "t.csv:1", "kind does not fit"),
         ("electrode: Calomel,", b"rebound\n30\n", "t.csv:1", "electrode does not fit"),
         ("along: 0.5, unit: \"ue\",", b"gauge,value\nSG1,5\n", "t.csv:1", "where they are defined"),
+        (
+            "",
+            b"gauge,value,unit\nSG1,5,ue\nSG1,5,kN\n",
+            "t.csv:3: column unit",
+            "give the unit ue, m/m",
+        ),
+        ("", b"gauge,value,unit\nSG1,5,ue\nSG1,5,\n", "t.csv:3: column unit", "in which unit"),
+        ("", b"gauge,value,unit\nSG1,5,ue\nSG1,5,mm\n", "t.csv:3: column value", "ue or m/m"),
+        ("", b"gauge,value,unit\nSG1,41,m/m\n", "t.csv:2: column value", "in ue?"),
+        ("", b"gauge,value,units\nSG1,5,ue\n", "t.csv:1", "did you mean unit?"),
+        (
+            "unit: \"ue\",",
+            b"gauge,value,unit\nSG1,1e-5,m/m\n",
+            "t.csv:2: column unit",
+            "ue is given for the whole table",
+        ),
+        ("kind: Cover,", b"value,unit\n30,mm\n30,V\n", "t.csv:3: column unit", "in mm or cm"),
+        ("kind: Cover,", b"value,unit\n30,mm\n30,\n", "t.csv:3: column unit", "in mm or cm"),
+        ("kind: Cover,", b"value\n30\n", "t.csv:1", "in mm or cm"),
+        ("kind: Rebound,", b"value,unit\n30,R\n", "t.csv:2: column unit", "has no unit"),
+        ("", b"mV,unit\n-0.3,V\n", "t.csv:2: column unit", "has its unit in its name"),
+        (
+            "",
+            b"depth_mm,chloride_percent_cement,unit\n5,1,kg/m3\n",
+            "t.csv:2: column unit",
+            "has its unit in its name",
+        ),
         ("", b"along,mV\n0.1,-300\n\n\n0.2,abc\n", "t.csv:5: column mV", "is no number"),
         ("", b"along;mV\n0,1;-1.300,5\n", "t.csv:2: column mV", "thousands"),
         ("", b"along,mV\n0,1,-300,5\n", "t.csv:2", "decimal comma"),

@@ -291,7 +291,8 @@ impl Checker<'_> {
         if let Some(instrument) = &s.instrument {
             self.text("instrument", instrument);
         }
-        if let Err(message) = table::unit(s.kind, s.unit.as_deref()) {
+        // Where it is not given here the table may have a column of units.
+        if let (Some(_), Err(message)) = (&s.unit, table::unit(s.kind, s.unit.as_deref())) {
             self.error("unit", "UNIT", message);
         }
     }

@@ -260,8 +260,8 @@ impl Finding {
 /// A table (CSV) of many observations of one kind on a member, one a row, or of readings of gauges.
 /// Its columns tell which: `mV`, `cover_mm`, `rebound`, `velocity_m_s`, `carbonation_mm`, `depth_mm`
 /// with `chloride_percent_cement` or `chloride_percent_concrete`, or `gauge` with `value`. Beside
-/// these: `along`, `face`, `angle_deg`, `height_m`, `date`, `std_error` (in the value's unit) and,
-/// of gauges, `test`. Of gauges, `along` with `face` or `angle_deg`, and `depth_mm`, are where a
+/// these: `along`, `face`, `angle_deg`, `height_m`, `date`, `std_error` (in the value's unit), beside
+/// `value` its `unit` and, of gauges, `test`. Of gauges, `along` with `face` or `angle_deg`, and `depth_mm`, are where a
 /// gauge is: one that is not known yet is defined by them, to measure strain along the axis (`ue`,
 /// `m/m`) or displacement upwards (`mm`, `m`).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -299,8 +299,8 @@ pub struct Survey {
     /// What the column `value` holds where the table names no gauges.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub kind: Option<Kind>,
-    /// In which unit the column `value` is: of gauges `"ue"` (millionths), `"m/m"`, `"mm"`, `"m"`
-    /// or `"MPa"`.
+    /// In which unit the column `value` is, unless a column `unit` says it row by row: of gauges
+    /// `"ue"` (millionths), `"m/m"`, `"mm"`, `"m"` or `"MPa"`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unit: Option<String>,
     /// Of gauges: the load test, of rows that do not name one.

@@ -36,6 +36,7 @@ enum Column {
     Gauge,
     Test,
     Value,
+    Unit,
     Depth,
     OfCement,
     OfConcrete,
@@ -43,7 +44,7 @@ enum Column {
 }
 
 /// Names of columns. Those of what was measured end in their unit.
-const COLUMNS: [(&str, Column); 18] = [
+const COLUMNS: [(&str, Column); 19] = [
     ("along", Column::Along),
     ("face", Column::Face),
     ("angle_deg", Column::Angle),
@@ -54,6 +55,7 @@ const COLUMNS: [(&str, Column); 18] = [
     ("gauge", Column::Gauge),
     ("test", Column::Test),
     ("value", Column::Value),
+    ("unit", Column::Unit),
     ("depth_mm", Column::Depth),
     ("chloride_percent_cement", Column::OfCement),
     ("chloride_percent_concrete", Column::OfConcrete),
@@ -110,9 +112,12 @@ impl GaugeUnit {
     ];
 
     fn named(name: &str) -> Option<Self> {
-        // The Greek letter and the sign that looks like it.
-        let name =
-            if matches!(name, "µε" | "με" | "um/m" | "µm/m" | "μm/m") { "ue" } else { name };
+        let name = match name {
+            // The Greek letter and the sign that looks like it.
+            "µε" | "με" | "um/m" | "µm/m" | "μm/m" => "ue",
+            "N/mm2" | "N/mm²" => "MPa",
+            name => name,
+        };
         Self::ALL.iter().find(|(known, _)| *known == name).map(|(_, unit)| *unit)
     }
 
@@ -174,6 +179,17 @@ impl GaugeUnit {
         };
         f64::max(least, 0.02 * value.abs())
     }
+}
+
+/// The unit of gauges that was given.
+fn gauge_unit(given: Option<&str>) -> Result<GaugeUnit, String> {
+    given.and_then(GaugeUnit::named).ok_or_else(|| {
+        let why = match given {
+            Some(other) => format!("\"{}\" is no unit of a gauge", shorten(other)),
+            None => "nothing says in which unit the gauges were read".into(),
+        };
+        format!("{why}: give the unit ue, m/m, mm, m or MPa")
+    })
 }
 
 /// Refuses a unit that does not fit what `value` holds; gives what makes it that of [`Finding`].
@@ -252,9 +268,10 @@ pub(crate) fn read(file: &str, bytes: &[u8], survey: &Survey) -> Result<Rows, Ve
     let mut out = Rows { note: table.note(), ..Rows::default() };
     let mut problems = Vec::new();
     match table.holds {
-        Holds::One { kind, column, factor } => {
+        Holds::One { kind, column } => {
             for (n, row) in rows.iter().enumerate() {
                 let found = row.number(column).and_then(|value| {
+                    let factor = row.factor(kind, column)?;
                     let error = row.optional(Column::StdError)?.map(|e| e * factor);
                     let finding = finding(kind, value * factor, error, survey);
                     table.record(row, format!("{} {}", survey.name, n + 1), finding)
@@ -265,18 +282,16 @@ pub(crate) fn read(file: &str, bytes: &[u8], survey: &Survey) -> Result<Rows, Ve
         Holds::Profiles { column } => {
             let profiles: Vec<&[Row]> = rows.chunk_by(|a, b| a.same_place(b)).collect();
             for (n, profile) in profiles.iter().enumerate() {
-                let name = match profiles.len() {
-                    1 => survey.name.clone(),
-                    _ => format!("{} {}", survey.name, n + 1),
-                };
+                // The table has its own name already, however few profiles there are.
+                let name = format!("{} {}", survey.name, n + 1);
                 take(table.profile(profile, name, column), &mut out.records, &mut problems);
             }
         }
-        Holds::Gauges { unit } => {
+        Holds::Gauges => {
             for row in &rows {
-                take(table.reading(row, unit), &mut out.readings, &mut problems);
+                take(table.reading(row), &mut out.readings, &mut problems);
             }
-            problems.extend(table.hardly_strained(unit, &out.readings));
+            problems.extend(table.hardly_strained(&out.readings));
         }
     }
     if !problems.is_empty() {
@@ -323,9 +338,9 @@ fn finding(kind: Kind, value: f64, error: Option<f64>, survey: &Survey) -> Findi
 /// What the rows of a table are.
 #[derive(Debug, Clone, Copy)]
 enum Holds {
-    One { kind: Kind, column: Column, factor: f64 },
+    One { kind: Kind, column: Column },
     Profiles { column: Column },
-    Gauges { unit: GaugeUnit },
+    Gauges,
 }
 
 /// A table whose header is sound.
@@ -433,7 +448,7 @@ impl<'a> Table<'a> {
         let mut told = Vec::new();
         for &column in self.columns.iter().flatten() {
             match column {
-                Column::Of(kind) => told.push(Holds::One { kind, column, factor: 1.0 }),
+                Column::Of(kind) => told.push(Holds::One { kind, column }),
                 Column::OfCement | Column::OfConcrete => told.push(Holds::Profiles { column }),
                 Column::Value if !self.has(Column::Gauge) => told.push(self.of_value()?),
                 Column::Gauge => told.push(self.of_gauges()?),
@@ -475,7 +490,7 @@ impl<'a> Table<'a> {
     /// A column that says nothing beside what the table holds.
     fn stray(&self, holds: Holds) -> Option<String> {
         let profile = matches!(holds, Holds::Profiles { .. });
-        let gauges = matches!(holds, Holds::Gauges { .. });
+        let gauges = matches!(holds, Holds::Gauges);
         let of_value = matches!(holds, Holds::One { column: Column::Value, .. });
         let is_stray = |column: &&Column| match column {
             Column::Depth => !profile && !gauges,
@@ -504,7 +519,7 @@ impl<'a> Table<'a> {
     fn unfit(&self, holds: Holds) -> Option<String> {
         let Survey { along, face, angle_deg, height_m, kind, unit, test, electrode, .. } =
             self.survey;
-        let gauges = matches!(holds, Holds::Gauges { .. });
+        let gauges = matches!(holds, Holds::Gauges);
         let of_value = matches!(holds, Holds::One { column: Column::Value, .. });
         // The side of all gauges may be said once, where each row says how far along it is.
         let has_side = (face.is_some() || angle_deg.is_some()) && !self.has(Column::Along);
@@ -534,9 +549,11 @@ impl<'a> Table<'a> {
             );
             return Err(self.in_header("NO_KIND", message));
         };
-        let factor = unit(Some(kind), self.survey.unit.as_deref())
-            .map_err(|why| self.in_header("UNIT", format!("the unit of `value` {why}")))?;
-        Ok(Holds::One { kind, column: Column::Value, factor })
+        if let Some(given) = self.unit_of_all() {
+            unit(Some(kind), given)
+                .map_err(|why| self.in_header("UNIT", format!("the unit of `value` {why}")))?;
+        }
+        Ok(Holds::One { kind, column: Column::Value })
     }
 
     fn of_gauges(&self) -> Result<Holds, Problem> {
@@ -544,18 +561,16 @@ impl<'a> Table<'a> {
             let message = "the column value is missing: what the gauges showed";
             return Err(self.in_header("NO_VALUE", message.into()));
         }
-        let given = self.survey.unit.as_deref();
-        match given.and_then(GaugeUnit::named) {
-            Some(unit) => Ok(Holds::Gauges { unit }),
-            None => {
-                let why = match given {
-                    Some(other) => format!("\"{}\" is no unit of a gauge", shorten(other)),
-                    None => "nothing says in which unit the gauges were read".into(),
-                };
-                let message = format!("{why}: give the unit ue, m/m, mm, m or MPa");
-                Err(self.in_header("NO_UNIT", message))
-            }
+        if let Some(given) = self.unit_of_all() {
+            gauge_unit(given).map_err(|why| self.in_header("NO_UNIT", why))?;
         }
+        Ok(Holds::Gauges)
+    }
+
+    /// What is said, or not, of the unit of all rows; `None` where each row has to say it.
+    fn unit_of_all(&self) -> Option<Option<&str>> {
+        let given = self.survey.unit.as_deref();
+        (given.is_some() || !self.has(Column::Unit)).then_some(given)
     }
 
     /// All rows, with their lines.
@@ -625,6 +640,7 @@ impl<'a> Table<'a> {
     ) -> Result<Placed<Record>, Problem> {
         let numbers = |column| rows.iter().map(|r| r.number(column)).collect::<Result<Vec<_>, _>>();
         let (depths_mm, percents) = (numbers(Column::Depth)?, numbers(column)?);
+        rows.iter().try_for_each(|row| row.is_percent(column))?;
         let errors: Result<Vec<_>, _> = rows.iter().map(|r| r.optional(Column::StdError)).collect();
         let of_cement = column == Column::OfCement;
         let shows = Finding::Chloride {
@@ -640,11 +656,13 @@ impl<'a> Table<'a> {
         self.record(first, name, shows)
     }
 
-    fn reading(&self, row: &Row, unit: GaugeUnit) -> Result<Placed<RawReading>, Problem> {
+    fn reading(&self, row: &Row) -> Result<Placed<RawReading>, Problem> {
         let Some(of) = row.text(Column::Gauge) else {
             return Err(row.wrong(Column::Gauge, "EMPTY", "names no gauge"));
         };
         let shown = row.number(Column::Value)?;
+        let unit =
+            gauge_unit(row.unit()?).map_err(|why| row.wrong(Column::Unit, "NO_UNIT", why))?;
         if let Some(why) = unit.absurd(shown) {
             return Err(row.wrong(Column::Value, "UNIT", why));
         }
@@ -672,10 +690,10 @@ impl<'a> Table<'a> {
     }
 
     /// Refuses millionths none of which is as much as any gauge can tell from nought.
-    fn hardly_strained(&self, unit: GaugeUnit, rows: &[Placed<RawReading>]) -> Option<Problem> {
-        let values = || rows.iter().map(|row| row.what.value.abs());
-        let largest = values().fold(0.0, f64::max);
-        let hardly = unit == GaugeUnit::MicroStrain && largest > 0.0 && largest < LEAST_STRAIN;
+    fn hardly_strained(&self, rows: &[Placed<RawReading>]) -> Option<Problem> {
+        let strains = rows.iter().filter(|row| row.what.unit == GaugeUnit::MicroStrain);
+        let largest = strains.map(|row| row.what.value.abs()).fold(0.0, f64::max);
+        let hardly = largest > 0.0 && largest < LEAST_STRAIN;
         hardly.then(|| {
             let message =
                 "none is above 0.05 ue, less than any gauge can tell: in m/m? give the unit m/m";
@@ -716,7 +734,7 @@ impl<'a> Table<'a> {
             (_, field) if field.starts_with("shows.std_error") => Column::StdError,
             (_, field) if field.starts_with("shows.depths") => Column::Depth,
             (Holds::One { column, .. } | Holds::Profiles { column }, _) => column,
-            (Holds::Gauges { .. }, _) => Column::Value,
+            (Holds::Gauges, _) => Column::Value,
         };
         column.name()
     }
@@ -814,6 +832,56 @@ impl Row<'_> {
     fn number(&self, column: Column) -> Result<f64, Problem> {
         let empty = || self.wrong(column, "EMPTY", "is empty: give a value, or take the row out");
         self.optional(column)?.ok_or_else(empty)
+    }
+
+    /// In which unit its value is: as the row says, or as is said of all.
+    fn unit(&self) -> Result<Option<&str>, Problem> {
+        let (own, of_all) = (self.text(Column::Unit), self.table.survey.unit.as_deref());
+        // Units of gauges may be written in several ways.
+        let differ = |a: &str, b: &str| {
+            a != b && GaugeUnit::named(a).is_none_or(|unit| GaugeUnit::named(b) != Some(unit))
+        };
+        match (own, of_all) {
+            (Some(own), Some(all)) if differ(own, all) => {
+                let (own, all) = (shorten(own), shorten(all));
+                let message = format!(
+                    "is {own}, and {all} is given for the whole table: leave that out, or correct \
+                     the row"
+                );
+                Err(self.wrong(Column::Unit, "UNIT", message))
+            }
+            _ => Ok(own.or(of_all)),
+        }
+    }
+
+    /// Refuses another unit than the column's.
+    fn is_percent(&self, column: Column) -> Result<(), Problem> {
+        match self.text(Column::Unit).filter(|unit| !unit.contains('%')) {
+            Some(unit) => Err(self.not_of(column, unit)),
+            None => Ok(()),
+        }
+    }
+
+    fn not_of(&self, column: Column, unit: &str) -> Problem {
+        let message = format!(
+            "is {}, and the column {} has its unit in its name: correct one of them",
+            shorten(unit),
+            column.name()
+        );
+        self.wrong(Column::Unit, "UNIT", message)
+    }
+
+    /// What makes its number in `column` that of [`Finding`].
+    fn factor(&self, kind: Kind, column: Column) -> Result<f64, Problem> {
+        let said = self.unit()?;
+        if column == Column::Value {
+            return unit(Some(kind), said).map_err(|why| self.wrong(Column::Unit, "UNIT", why));
+        }
+        let of_column = kind.units().first().map(|(name, _)| *name);
+        match said.filter(|said| Some(*said) != of_column) {
+            Some(other) => Err(self.not_of(column, other)),
+            None => Ok(1.0),
+        }
     }
 
     fn face(&self) -> Result<Option<Face>, Problem> {
