@@ -6,7 +6,7 @@ use bevy_ecs::prelude::*;
 use intrados_light::{RenderSettings, View};
 use intrados_predict::Progress;
 use intrados_scene::{
-    attach::{Attachment, Face},
+    attach::{Attachment, Face, Setting},
     plugin::{CurrentScene, OpenAsProject, OpenScene},
 };
 
@@ -94,7 +94,9 @@ pub enum Action {
     Attach(Box<Attachment>),
     /// Detach evidence, as `intrados detach` does: from the member of this id what has this name.
     Detach(String, String),
-    /// Take the last change of the evidence back.
+    /// Write values that a form has changed into the scene's file; how people call that.
+    Amend(Vec<Setting>, String),
+    /// Take the last change of the evidence or of the scene back.
     Undo,
     /// Make the last change that was taken back again.
     Redo,
@@ -246,6 +248,7 @@ fn carry_out(world: &mut World, action: Action) {
         Action::Fill(files, place) => fill(world, files, place),
         Action::Attach(what) => edits::begin(world, Edit::Attach(what)),
         Action::Detach(member, name) => edits::begin(world, Edit::Detach { member, name }),
+        Action::Amend(settings, what) => edits::begin(world, Edit::Amend(settings, what)),
         Action::Undo => edits::begin(world, Edit::Undo),
         Action::Redo => edits::begin(world, Edit::Redo),
         Action::Export => {

@@ -41,6 +41,7 @@ mod stress;
 mod structure;
 mod surface;
 mod toast;
+mod values;
 mod viewpoint;
 mod window;
 mod workspace;

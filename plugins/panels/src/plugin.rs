@@ -67,6 +67,7 @@ impl Plugin for PanelsPlugin {
             .init_resource::<layout::Layout>()
             .init_resource::<command::Palette>()
             .init_resource::<sheet::Listing>()
+            .init_resource::<sheet::Properties>()
             .init_resource::<attach::Form>()
             .init_resource::<drops::Drops>()
             .init_resource::<edits::Edits>()

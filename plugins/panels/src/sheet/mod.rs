@@ -7,6 +7,7 @@ mod evidence;
 mod faces;
 mod links;
 mod overview;
+mod properties;
 
 use bevy_ecs::prelude::*;
 use egui::{RichText, Ui};
@@ -22,6 +23,7 @@ use crate::{
 };
 
 pub(crate) use evidence::Listing;
+pub(crate) use properties::Properties;
 
 /// Draws it.
 pub(crate) fn member(
@@ -31,18 +33,21 @@ pub(crate) fn member(
     selection: Res<Selection>,
     mut mechanics: Mechanics,
     mut listing: ResMut<Listing>,
+    mut properties: ResMut<Properties>,
     mut actions: ResMut<Actions>,
 ) {
     let Some(scene) = scene else { return };
     let scene = &scene.0;
     let Some((index, member)) = selection.0.and_then(|i| Some((i, scene.members.get(i)?))) else {
         overview::overview(ui, scene, &latest, &mut actions);
+        properties.bypass_change_detection().show(ui, scene, None, &mut actions);
         return;
     };
     head(ui, member);
     // Above what grows while it is predicted: a button stays where it is.
     ways(ui, scene, member, &mut actions);
     standing(ui, index, &latest, &mut actions);
+    properties.bypass_change_detection().show(ui, scene, Some(member), &mut actions);
     let result = latest.result_for(scene);
     let told = result.and_then(|r| r.members.get(index));
     if let Some(predicted) = latest.member(index) {
@@ -70,10 +75,15 @@ pub(crate) fn member(
 
 /// A part of the sheet under its name.
 fn section(ui: &mut Ui, name: &str, draw: impl FnOnce(&mut Ui)) {
+    part(ui, name, true, draw);
+}
+
+/// The same, which may be closed at first.
+fn part(ui: &mut Ui, name: &str, is_open: bool, draw: impl FnOnce(&mut Ui)) {
     ui.add_space(4.0);
     egui::CollapsingHeader::new(RichText::new(name).strong())
         .id_salt(name)
-        .default_open(true)
+        .default_open(is_open)
         .show_unindented(ui, draw);
 }
 
