@@ -14,6 +14,7 @@ use crate::{
     Banners, Log, Look, Quantity, Refine, Selection, Viewpoint, Workspace,
     attach::Form,
     command::Palette,
+    create::Creation,
     ct::Ct,
     dialog::{Dialogs, Purpose},
     edits::{self, Edit},
@@ -31,6 +32,8 @@ use crate::{
 pub enum Action {
     /// Choose a file to open.
     Choose,
+    /// Make a new structure from a template.
+    New,
     /// Open a file, or a bundled scene by its name.
     Open(PathBuf),
     /// Make a project of the model that is open, in a folder beside it, and open that: only a
@@ -151,6 +154,7 @@ pub(crate) fn act(world: &mut World) {
 fn carry_out(world: &mut World, action: Action) {
     match action {
         Action::Choose => Dialogs::open(world, Purpose::Open),
+        Action::New => world.resource_mut::<Creation>().begin(),
         Action::ChooseExport => {
             let name = world.resource::<Export>().path.clone();
             Dialogs::open(world, Purpose::Save(name));
@@ -328,6 +332,7 @@ fn dismiss(world: &mut World) {
     }
     if world.resource_mut::<Saving>().dismiss()
         || std::mem::take(&mut world.resource_mut::<Form>().is_open)
+        || std::mem::take(&mut world.resource_mut::<Creation>().is_open)
         || std::mem::take(&mut world.resource_mut::<Layout>().keys)
         || world.resource_mut::<Banners>().dismiss()
     {

@@ -7,6 +7,7 @@ mod chart;
 mod colours;
 mod command;
 mod convergence;
+mod create;
 mod ct;
 mod dialog;
 mod directions;

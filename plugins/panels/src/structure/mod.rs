@@ -6,6 +6,8 @@ mod model;
 mod section;
 mod spot;
 
+use std::sync::Arc;
+
 use bevy_ecs::prelude::*;
 use egui::{Rect, Ui, vec2};
 use glam::Vec3;
@@ -61,6 +63,21 @@ impl Structure {
     /// The place on a member that is at a point of the window, while the picture is in sight.
     pub(crate) fn spot(&self, at: egui::Pos2) -> Option<Spot> {
         self.model.spot(at)
+    }
+}
+
+/// The picture of a structure of which nothing is known yet.
+pub(crate) struct Preview(model::Model);
+
+impl Default for Preview {
+    fn default() -> Self {
+        Self(model::Model { is_bare: true, ..model::Model::default() })
+    }
+}
+
+impl Preview {
+    pub(crate) fn show(&mut self, ui: &mut Ui, rect: Rect, scene: &Arc<Scene>) {
+        self.0.show(ui, rect, scene, &Latest::default(), Selection(None), None);
     }
 }
 

@@ -40,6 +40,8 @@ const LEGEND: f32 = 92.0;
 /// What is remembered between frames.
 #[derive(Default)]
 pub(super) struct Model {
+    /// Nothing is known of it: there is no scale of damage.
+    pub(super) is_bare: bool,
     /// Hash of the scene that the facets are of.
     of: String,
     facets: Arc<Vec<Facet>>,
@@ -100,7 +102,8 @@ impl Model {
         let (width, height) = (rect.width().max(8.0) as u32, rect.height().max(8.0) as u32);
         let response = ui.allocate_rect(rect, Sense::click_and_drag());
         response.widget_info(|| {
-            egui::WidgetInfo::labeled(egui::Role::Image, true, "Damage of members")
+            let name = if self.is_bare { "Preview" } else { "Damage of members" };
+            egui::WidgetInfo::labeled(egui::Role::Image, true, name)
         });
         let camera = match &self.camera {
             Some(camera) => Camera { width, height, ..camera.clone() },
@@ -114,7 +117,9 @@ impl Model {
         let shown = self.shown.as_ref()?;
         let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
         ui.painter().image(shown.texture.id(), rect, whole, Color32::WHITE);
-        legend(ui, rect);
+        if !self.is_bare {
+            legend(ui, rect);
+        }
         scale(ui, rect, &camera);
         let under = response.hover_pos().and_then(|at| shown.spot(at));
         Some(Pointed { response, under, camera })
@@ -140,7 +145,8 @@ impl Model {
         let is_alike = !positions.is_empty() && bounds(&positions) == bounds(&self.positions);
         let camera = self.camera.take().filter(|_| is_alike);
         let facets = Arc::new(facets);
-        *self = Self { of: scene.hash.clone(), facets, positions, camera, ..Self::default() };
+        let (of, is_bare) = (scene.hash.clone(), self.is_bare);
+        *self = Self { is_bare, of, facets, positions, camera, shown: None };
     }
 
     /// Looks from another place, so that what is wanted fills the picture.

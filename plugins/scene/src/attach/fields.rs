@@ -63,6 +63,11 @@ impl Field {
         Ok(settings)
     }
 
+    /// Where it is written.
+    pub(super) fn place(&self) -> &[Step] {
+        &self.path
+    }
+
     fn ron(&self, text: &str) -> Result<String, String> {
         let name = &self.name;
         match self.kind {
@@ -180,10 +185,10 @@ impl List<'_> {
             let path = vec![Named("project"), Named(field)];
             list.add(name, "", FieldKind::Text, value.to_owned(), path);
         };
-        text(self, "name", "structure", &project.structure);
-        if !self.file.title.is_empty() {
-            self.note(format!("left out: {}", self.file.title));
-        }
+        let title = self.file.title.clone();
+        self.add("title", "", FieldKind::Text, title, vec![Named("title")]);
+        text(self, "owner's name of it", "structure", &project.structure);
+        self.note("left out: the title");
         text(self, "place", "place", &project.place);
         text(self, "owner", "owner", &project.owner);
         self.group("Inspection");

@@ -8,6 +8,7 @@
 
 mod amend;
 mod change;
+mod draft;
 mod edit;
 mod fields;
 mod listed;
@@ -34,6 +35,7 @@ use tempfile::TempDir;
 pub use crate::file::evidence::{Along, Face, Finding, Kind};
 pub use amend::Setting;
 pub use change::Change;
+pub use draft::Draft;
 pub use fields::{Field, FieldKind, fields};
 pub use listed::{Listed, listed};
 pub use raw::{Raw, VoxelType, VoxelTypeError};
