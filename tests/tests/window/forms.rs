@@ -3,12 +3,34 @@
 use std::fs;
 
 use bevy_ecs::world::World;
-use egui::Key;
+use egui::{Key, accesskit::Role};
 use egui_kittest::kittest::Queryable;
 use intrados_panels::{Action, Latest, Selection};
 use intrados_scene::plugin::CurrentScene;
 
-use super::{LONELY, Window, type_into, with_lonely};
+use intrados_predict::{PredictSettings, Predicting};
+
+use super::{LONELY, Window, type_into};
+
+/// A crack that somebody has seen: something to predict without a life, which takes long.
+const SEEN: &str = r#"(
+    schema: "intrados.evidence/1",
+    items: [(member: "C1", name: "crack 1", date: "2026-05-03", along: 0.4, face: Front, shows: Crack(width_mm: 0.4, course: Along))],
+)"#;
+
+/// A window with a column, and what has been seen of it.
+fn with_seen() -> (Window, tempfile::TempDir) {
+    let folder = tempfile::tempdir().expect("a folder for the scene");
+    let file = folder.path().join("lonely.ron");
+    fs::write(&file, LONELY).expect("written");
+    fs::write(folder.path().join("evidence.ron"), SEEN).expect("written");
+    let mut window = Window::new(|app| {
+        app.world_mut().resource_mut::<Predicting>().settings =
+            PredictSettings { forecast: None, ..PredictSettings::default() };
+    });
+    window.ask(Action::Open(file));
+    (window, folder)
+}
 
 /// Whether anything in the window has this text in its name.
 fn has(window: &Window, text: &str) -> bool {
@@ -41,7 +63,7 @@ fn opened(window: &mut Window) {
 /// its comments, and Ctrl+Z brings the old ones back to the byte.
 #[test]
 fn a_member_is_changed_in_its_sheet_and_changed_back() {
-    let (mut window, folder) = with_lonely();
+    let (mut window, folder) = with_seen();
     let file = folder.path().join("lonely.ron");
     opened(&mut window);
     type_into(&mut window, "width", "0,5");
@@ -67,7 +89,7 @@ fn a_member_is_changed_in_its_sheet_and_changed_back() {
 /// typed stays, to be mended.
 #[test]
 fn what_cannot_be_is_refused_with_the_line_of_the_file() {
-    let (mut window, folder) = with_lonely();
+    let (mut window, folder) = with_seen();
     let file = folder.path().join("lonely.ron");
     opened(&mut window);
     type_into(&mut window, "width", "wide");
@@ -87,7 +109,7 @@ fn what_cannot_be_is_refused_with_the_line_of_the_file() {
 /// What stands on the report's cover is filled in where no member is selected.
 #[test]
 fn the_cover_of_the_report_is_filled_in() {
-    let (mut window, folder) = with_lonely();
+    let (mut window, folder) = with_seen();
     window.until("a scene", |w| w.contains_resource::<CurrentScene>());
     window.frames(2);
     window.click("Owner, inspection, air");
@@ -113,4 +135,48 @@ fn a_scene_of_the_program_is_shown_and_not_changed() {
     assert!(has(&window, "This scene is part of the program"));
     assert!(has(&window, "Choose concrete class"));
     assert!(window.harness.query_by_label("Apply").is_none());
+}
+
+/// A structure is made from a template: what is typed is seen before anything is written, what no
+/// scene may be is refused, and then its folder is there and open.
+#[test]
+fn a_new_structure_is_seen_before_it_is_made() {
+    let mut window = Window::new(|_| {});
+    let folder = tempfile::tempdir().expect("a folder");
+    window.frames(2);
+    window.click("New structure…");
+    window.until_seen("Preview");
+    window.until_seen("height");
+    let place = folder.path().join("pier");
+    type_into(&mut window, "Folder to make", &place.display().to_string());
+    type_into(&mut window, "title", "Pier 7");
+    type_into(&mut window, "height", "-4");
+    window.until_said("members[0].body");
+    assert!(!place.exists());
+    type_into(&mut window, "height", "4.5");
+    // 0.4 × 0.4 × 4.5 m³.
+    window.until_said("one member, 0.72 m³ of concrete");
+    window.harness.get_by_role_and_label(Role::Button, "Make it").click();
+    window.until("the scene", |w| w.get_resource::<CurrentScene>().is_some());
+    let scene = window.with(|w| w.resource::<CurrentScene>().0.clone());
+    assert_eq!((scene.title.as_str(), scene.path.as_path()), ("Pier 7", &*place.join("scene.ron")));
+    let [low, high] = scene.members[0].bounds;
+    assert!((high.y - low.y - 4.5).abs() < 1e-4);
+    assert!(place.join("evidence.ron").exists());
+    window.frames(2);
+    assert!(window.harness.query_by_label("Preview").is_none(), "the dialog is gone");
+}
+
+impl Window {
+    /// Frames until something has this text in its name.
+    fn until_said(&mut self, text: &str) {
+        for _ in 0..super::PATIENCE {
+            if has(self, text) {
+                return;
+            }
+            self.frame();
+            std::thread::sleep(std::time::Duration::from_millis(1));
+        }
+        panic!("{text} was not said");
+    }
 }
