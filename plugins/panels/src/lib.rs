@@ -20,6 +20,7 @@ mod layout;
 mod log;
 mod members;
 mod meters;
+mod moment;
 mod number;
 mod orbit;
 mod outline;

@@ -19,6 +19,7 @@ use capacity::Mechanics;
 
 use crate::{
     Action, Actions, Latest, Selection, colours,
+    moment::Course,
     number::{copied, plus_minus},
 };
 
@@ -206,6 +207,14 @@ fn foretold(ui: &mut Ui, told: &MemberPrediction) {
     let value = plus_minus(forecast.damage, forecast.std_error, "");
     copied(ui, RichText::new(format!("d = {}", value.trim())));
     ui.label(&forecast.basis);
+    if let Some(course) = Course::of(told) {
+        let (zone, now, later) = course.worst();
+        let years = course.years;
+        ui.label(format!(
+            "In {years:.0} years it loses most in {zone} of the axis: d = {now:.2} becomes {later:.2}."
+        ));
+        bars::two(ui, &course);
+    }
     let rust = forecast.details.get("rust");
     let Some(rust) = rust else { return };
     if let Some(why) = rust["why_not"].as_str() {
