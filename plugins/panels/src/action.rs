@@ -6,7 +6,7 @@ use bevy_ecs::prelude::*;
 use intrados_light::{RenderSettings, View};
 use intrados_predict::Progress;
 use intrados_scene::{
-    attach::{Attachment, Face},
+    attach::{Attachment, Face, Setting},
     plugin::{CurrentScene, OpenAsProject, OpenScene},
 };
 
@@ -14,6 +14,7 @@ use crate::{
     Banners, Log, Look, Quantity, Refine, Selection, Viewpoint, Workspace,
     attach::Form,
     command::Palette,
+    create::Creation,
     ct::Ct,
     dialog::{Dialogs, Purpose},
     edits::{self, Edit},
@@ -31,6 +32,8 @@ use crate::{
 pub enum Action {
     /// Choose a file to open.
     Choose,
+    /// Make a new structure from a template.
+    New,
     /// Open a file, or a bundled scene by its name.
     Open(PathBuf),
     /// Make a project of the model that is open, in a folder beside it, and open that: only a
@@ -94,7 +97,9 @@ pub enum Action {
     Attach(Box<Attachment>),
     /// Detach evidence, as `intrados detach` does: from the member of this id what has this name.
     Detach(String, String),
-    /// Take the last change of the evidence back.
+    /// Write values that a form has changed into the scene's file; how people call that.
+    Amend(Vec<Setting>, String),
+    /// Take the last change of the evidence or of the scene back.
     Undo,
     /// Make the last change that was taken back again.
     Redo,
@@ -149,6 +154,7 @@ pub(crate) fn act(world: &mut World) {
 fn carry_out(world: &mut World, action: Action) {
     match action {
         Action::Choose => Dialogs::open(world, Purpose::Open),
+        Action::New => world.resource_mut::<Creation>().begin(),
         Action::ChooseExport => {
             let name = world.resource::<Export>().path.clone();
             Dialogs::open(world, Purpose::Save(name));
@@ -246,6 +252,7 @@ fn carry_out(world: &mut World, action: Action) {
         Action::Fill(files, place) => fill(world, files, place),
         Action::Attach(what) => edits::begin(world, Edit::Attach(what)),
         Action::Detach(member, name) => edits::begin(world, Edit::Detach { member, name }),
+        Action::Amend(settings, what) => edits::begin(world, Edit::Amend(settings, what)),
         Action::Undo => edits::begin(world, Edit::Undo),
         Action::Redo => edits::begin(world, Edit::Redo),
         Action::Export => {
@@ -325,6 +332,7 @@ fn dismiss(world: &mut World) {
     }
     if world.resource_mut::<Saving>().dismiss()
         || std::mem::take(&mut world.resource_mut::<Form>().is_open)
+        || std::mem::take(&mut world.resource_mut::<Creation>().is_open)
         || std::mem::take(&mut world.resource_mut::<Layout>().keys)
         || world.resource_mut::<Banners>().dismiss()
     {

@@ -63,6 +63,7 @@ fn fixed(look: &Look) -> Vec<Command> {
     let quantity = if is_error { Quantity::Radiance } else { Quantity::Error };
     let by = |modifiers: Modifiers, key: Key| Some((modifiers, key));
     vec![
+        command("new structure", "Ctrl+N", by(CTRL, Key::N), Action::New),
         command("open a file", "Ctrl+O", by(CTRL, Key::O), Action::Choose),
         command("save the report", "Ctrl+S", by(CTRL, Key::S), Action::Save(Taken::Report)),
         command("save the picture of light", "Ctrl+E", by(CTRL, Key::E), Action::Export),

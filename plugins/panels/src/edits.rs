@@ -1,12 +1,17 @@
-//! Changes of evidence in the window, through the code of `intrados attach` and `intrados detach`:
-//! off the frame, one after another, each of which can be taken back.
+//! Changes of evidence in the window, through the code of `intrados attach` and `intrados detach`,
+//! and of the scene's own file by forms: off the frame, one after another, each of which can be
+//! taken back.
 
-use std::path::{Path, PathBuf};
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
 use bevy_ecs::prelude::*;
 use intrados_predict::attaching;
 use intrados_scene::{
-    attach::{Attachment, Change, Project},
+    Scene,
+    attach::{Attachment, Change, Project, Setting},
     plugin::{CurrentScene, OpenScene, SceneChanged},
 };
 use intrados_stage::{Access, Job, Jobs, Task};
@@ -16,11 +21,16 @@ use crate::{Banners, Log, toast::Toasts};
 /// So many changes can be taken back.
 const MOST: usize = 64;
 
-/// What can be done to the evidence.
+/// What can be done to the files of a structure.
 #[derive(Debug, Clone)]
 pub(crate) enum Edit {
     Attach(Box<Attachment>),
-    Detach { member: String, name: String },
+    Detach {
+        member: String,
+        name: String,
+    },
+    /// Write values into the scene's file; how people call that.
+    Amend(Vec<Setting>, String),
     Undo,
     Redo,
 }
@@ -61,7 +71,7 @@ impl Edits {
 
 /// Begins an edit of the scene that is open; one at a time.
 pub(crate) fn begin(world: &mut World, edit: Edit) {
-    let Some(scene) = world.get_resource::<CurrentScene>().map(|s| s.0.path.clone()) else {
+    let Some(scene) = world.get_resource::<CurrentScene>().map(|s| s.0.clone()) else {
         return;
     };
     let access = world.resource::<Access>().clone();
@@ -76,16 +86,21 @@ pub(crate) fn begin(world: &mut World, edit: Edit) {
 fn start(
     edits: &mut Edits,
     edit: Edit,
-    scene: PathBuf,
+    shown: Arc<Scene>,
     access: Access,
     jobs: &mut Jobs,
 ) -> Option<Task<Outcome>> {
+    let scene = shown.path.clone();
     Some(match edit {
         Edit::Attach(what) => Task::spawn(jobs, "attaching evidence", move |job| {
             attach(&scene, &what, &access, job).unwrap_or_else(|why| Outcome::Refused(why, None))
         }),
         Edit::Detach { member, name } => Task::spawn(jobs, "detaching evidence", move |job| {
             detach(&scene, &member, &name, &access, job)
+                .unwrap_or_else(|why| Outcome::Refused(why, None))
+        }),
+        Edit::Amend(settings, what) => Task::spawn(jobs, "changing the scene", move |job| {
+            amend(&shown, &settings, what, &access, job)
                 .unwrap_or_else(|why| Outcome::Refused(why, None))
         }),
         Edit::Undo => turn(edits.made.pop()?, jobs),
@@ -127,7 +142,20 @@ fn detach(
     Ok(Outcome::Made(Named { change, what: format!("detach {name}") }, Vec::new()))
 }
 
-/// Takes what has come of an edit, and opens the scene with its other evidence. Of another scene,
+/// Writes what a form says into the scene's file.
+fn amend(
+    shown: &Scene,
+    settings: &[Setting],
+    what: String,
+    access: &Access,
+    job: &Job,
+) -> Result<Outcome, String> {
+    let project = Project::edit(&shown.path, access, job).map_err(|why| why.to_string())?;
+    let change = project.amend(shown, settings, job).map_err(|why| why.to_string())?;
+    Ok(Outcome::Made(Named { change, what }, Vec::new()))
+}
+
+/// Takes what has come of an edit, and opens the scene as it is now. Of another scene,
 /// nothing can be taken back.
 pub(crate) fn take(
     mut changed: MessageReader<SceneChanged>,
@@ -171,8 +199,8 @@ pub(crate) fn take(
                 Some(named) => edits.taken_back.push(named),
                 None => {}
             }
-            log.say(format!("the evidence is as it was: {why}"));
-            banners.cannot("The evidence is as it was", &why);
+            log.say(format!("nothing was changed: {why}"));
+            banners.cannot("Nothing was changed", &why);
             return;
         }
     };

@@ -22,6 +22,7 @@ use crate::{
     Action, Actions, Banners, Latest, Log, Look, Selection, Workspace,
     attach::{self, Form},
     banner, command,
+    create::{self, Creation},
     ct::Ct,
     dialog::Dialogs,
     drops,
@@ -56,7 +57,7 @@ pub(crate) struct Layout {
     /// Whether the window fills the screen, and whether it is told so already.
     fullscreen: (bool, bool),
     /// Systems that draw what is no panel.
-    own: Option<[SystemId<InMut<'static, Ui>>; 4]>,
+    own: Option<[SystemId<InMut<'static, Ui>>; 5]>,
 }
 
 impl Layout {
@@ -158,6 +159,7 @@ pub fn is_busy(world: &mut World) -> bool {
         || world.resource::<Stress>().is_busy()
         || world.resource::<Export>().is_busy()
         || world.resource::<Edits>().is_busy()
+        || world.resource::<Creation>().is_busy()
         || world.resource::<Saving>().is_busy()
         || world.resource::<Report>().is_busy()
 }
@@ -170,7 +172,7 @@ pub fn show(ui: &mut Ui, world: &mut World) {
     // Before the keys: while it is open, it takes them.
     command::palette(ui, world);
     command::keys(ui, world);
-    let [start, sheet, form, saving] = own(world);
+    let [start, sheet, form, saving, creation] = own(world);
     session::offer(ui, world);
     banner::show(ui, world);
     if world.contains_resource::<CurrentScene>() && !world.resource::<Layout>().start {
@@ -178,13 +180,13 @@ pub fn show(ui: &mut Ui, world: &mut World) {
     } else {
         CentralPanel::default().show(ui, |ui| run(world, start, "start screen", ui));
     }
-    sheets(ui, world, [sheet, form, saving]);
+    sheets(ui, world, [sheet, form, saving, creation]);
     saving::picture(ui, world);
     toast::show(ui, world);
     drops::hint(ui, world);
 }
 
-fn own(world: &mut World) -> [SystemId<InMut<'static, Ui>>; 4] {
+fn own(world: &mut World) -> [SystemId<InMut<'static, Ui>>; 5] {
     if let Some(own) = world.resource::<Layout>().own {
         return own;
     }
@@ -193,6 +195,7 @@ fn own(world: &mut World) -> [SystemId<InMut<'static, Ui>>; 4] {
         world.register_system(IntoSystem::into_system(export::sheet)),
         world.register_system(IntoSystem::into_system(attach::form)),
         world.register_system(IntoSystem::into_system(saving::sheet)),
+        world.register_system(IntoSystem::into_system(create::dialog)),
     ];
     world.resource_mut::<Layout>().own = Some(own);
     own
@@ -268,6 +271,7 @@ fn menu(ui: &mut Ui, world: &mut World) {
                     asked.push(action);
                 }
             };
+            entry(ui, "New structure…", "Ctrl+N", Action::New);
             entry(ui, "Open…", "Ctrl+O", Action::Choose);
             entry(ui, "Start screen", "", Action::StartScreen(true));
             entry(ui, "Export picture…", "Ctrl+E", Action::Export);
@@ -347,7 +351,7 @@ fn menu(ui: &mut Ui, world: &mut World) {
     asked.into_iter().for_each(|action| world.resource_mut::<Actions>().ask(action));
 }
 
-/// What can be done to the evidence.
+/// What can be done to the evidence, and taken back.
 fn edits(world: &World, is_open: bool) -> [(String, &'static str, bool, Action); 3] {
     let has_member = is_open && world.resource::<Selection>().0.is_some();
     let edits = world.resource::<Edits>();
@@ -397,7 +401,7 @@ fn arrangement(ui: &mut Ui, world: &World, asked: &mut Vec<Action>) {
 fn sheets(
     ui: &mut Ui,
     world: &mut World,
-    [sheet, form, saving]: [SystemId<InMut<'static, Ui>>; 3],
+    [sheet, form, saving, creation]: [SystemId<InMut<'static, Ui>>; 4],
 ) {
     let centred = |title: &str| {
         egui::Window::new(title.to_owned())
@@ -416,6 +420,13 @@ fn sheets(
             .default_pos(ui.ctx().content_rect().center() - egui::vec2(320.0, 300.0))
             .show(ui.ctx(), |ui| run(world, form, "attach evidence", ui));
         world.resource_mut::<Form>().is_open &= open;
+    }
+    let mut open = world.resource::<Creation>().is_open;
+    if open {
+        centred("New structure").open(&mut open).show(ui.ctx(), |ui| {
+            run(world, creation, "new structure", ui);
+        });
+        world.resource_mut::<Creation>().is_open &= open;
     }
     let mut open = world.resource::<Saving>().is_shown();
     if open {

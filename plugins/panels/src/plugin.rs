@@ -8,10 +8,10 @@ use intrados_stage::Stage;
 
 use crate::{
     Actions, AddPanel, Banners, Latest, Log, Look, Place, Refine, Selection, Statistics, Viewpoint,
-    action, attach, banner, command, convergence, ct, dialog, directions, drops, edits, export,
-    fields, inspector, layout, log, members, meters, outline, photos, picture, place::Panels,
-    prediction, recent, refine, render, report, saving, session, sheet, statistics, steering,
-    stress, structure, toast, viewpoint, workspace,
+    action, attach, banner, command, convergence, create, ct, dialog, directions, drops, edits,
+    export, fields, inspector, layout, log, members, meters, outline, photos, picture,
+    place::Panels, prediction, recent, refine, render, report, saving, session, sheet, statistics,
+    steering, stress, structure, toast, viewpoint, workspace,
 };
 
 /// Adds the window's state and the built-in panels. It opens no window: whoever has one calls
@@ -67,9 +67,11 @@ impl Plugin for PanelsPlugin {
             .init_resource::<layout::Layout>()
             .init_resource::<command::Palette>()
             .init_resource::<sheet::Listing>()
+            .init_resource::<sheet::Properties>()
             .init_resource::<attach::Form>()
             .init_resource::<drops::Drops>()
             .init_resource::<edits::Edits>()
+            .init_resource::<create::Creation>()
             .init_resource::<toast::Toasts>()
             .init_resource::<saving::Saving>()
             .init_resource::<structure::Structure>()
@@ -98,6 +100,7 @@ impl Plugin for PanelsPlugin {
                     stress::take,
                     report::take,
                     edits::take,
+                    create::take,
                     saving::take,
                     session::keep,
                     banner::gather,

@@ -62,6 +62,11 @@ fn open_row(ui: &mut Ui, path: &mut String, dialog_is_open: bool, actions: &mut 
         if ui.add_enabled(!dialog_is_open, button).on_hover_text("Ctrl+O").clicked() {
             actions.ask(Action::Choose);
         }
+        let new = Button::new(RichText::new("New structure…").size(16.0));
+        let hint = "From a template of a column, a beam or a tunnel (Ctrl+N)";
+        if ui.add(new.min_size(egui::vec2(110.0, 34.0))).on_hover_text(hint).clicked() {
+            actions.ask(Action::New);
+        }
         ui.label("or drop a .ron, .glb, .gltf or .ifc file here, or its path:");
         let field = ui
             .add(egui::TextEdit::singleline(path).desired_width(240.0).hint_text("path of a file"));

@@ -32,7 +32,7 @@ pub use member::{AxisRuns, Damage, Drilled, Frame, Member, MemberKind, Slices};
 pub use mesh::Mesh;
 pub use plugin::ScenePlugin;
 pub use problem::{Problem, Severity};
-pub use scene::{Object, Part, Roulette, Scene, Transport};
+pub use scene::{Object, Part, Roulette, Scene, Transport, Written};
 pub use sensor::{Camera, Meter};
 pub use structure::{Assembly, SteelLine, Structure};
 pub use summary::Summary;

@@ -4,6 +4,7 @@ use std::{
     fs::File,
     io::Read,
     path::{Path, PathBuf},
+    sync::Arc,
 };
 
 use intrados_stage::{
@@ -16,6 +17,7 @@ use crate::{
     file::{self, SceneFile, evidence},
     gltf,
     problem::{Problem, Severity},
+    scene::Written,
 };
 
 /// Largest file that is read into memory, bytes.
@@ -213,7 +215,22 @@ impl Scene {
         access: &Access,
         job: &Job,
     ) -> Result<Self, LoadError> {
-        let proposed = Some(evidence.to_owned());
+        let sources = Sources::new(path, access);
+        let proposed = Some((sources.folder.join(evidence::NAME), evidence.to_owned()));
+        Self::load_from(path, Sources { proposed, ..sources }, job)
+    }
+
+    /// [`Scene::load_within`] as if this were the text of the scene itself.
+    ///
+    /// # Errors
+    /// As [`Scene::load`].
+    pub(crate) fn load_amended(
+        path: &Path,
+        text: &str,
+        access: &Access,
+        job: &Job,
+    ) -> Result<Self, LoadError> {
+        let proposed = Some((path.to_owned(), text.to_owned()));
         Self::load_from(path, Sources { proposed, ..Sources::new(path, access) }, job)
     }
 
@@ -339,7 +356,9 @@ pub(crate) fn from_text(
     }
     let evidence = evidence::gather(&parsed, sources, &mut problems, job)?;
     if problems.is_empty() {
-        file::resolve(name, &parsed, &evidence, sources, job)
+        let mut scene = file::resolve(name, &parsed, &evidence, sources, job)?;
+        scene.written = Written(Arc::new(parsed));
+        Ok(scene)
     } else {
         Err(LoadError::BadInput(problems))
     }
@@ -355,8 +374,8 @@ pub(crate) struct Sources {
     hasher: blake3::Hasher,
     /// Texels that its images may still have.
     pub(crate) texels: usize,
-    /// What is to be taken for the text of the evidence beside the scene.
-    proposed: Option<String>,
+    /// A file, and what is to be taken for its text.
+    proposed: Option<(PathBuf, String)>,
 }
 
 impl Sources {
@@ -382,7 +401,8 @@ impl Sources {
 
     fn of_folder(&self) -> Option<PathBuf> {
         let path = self.folder.join(evidence::NAME);
-        let there = self.proposed.is_some() || path.exists();
+        let is_proposed = self.proposed.as_ref().is_some_and(|(of, _)| *of == path);
+        let there = is_proposed || path.exists();
         (there && !self.given.as_os_str().is_empty()).then_some(path)
     }
 
@@ -432,9 +452,8 @@ impl Sources {
 
     /// Reads a file and adds it to the hash.
     pub(crate) fn read(&mut self, path: &Path, limit: u64) -> Result<Vec<u8>, LoadError> {
-        let proposed =
-            self.proposed.as_ref().filter(|_| self.of_folder().is_some_and(|e| e == path));
-        let read = if let Some(text) = proposed {
+        let proposed = self.proposed.as_ref().filter(|(of, _)| of == path);
+        let read = if let Some((_, text)) = proposed {
             Ok(text.clone().into_bytes())
         } else if path == self.given {
             access::read(path, limit)

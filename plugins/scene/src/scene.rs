@@ -4,7 +4,7 @@ use glam::{Mat4, Vec3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{Camera, Lamp, Material, Member, Mesh, Meter, Structure, Texture};
+use crate::{Camera, Lamp, Material, Member, Mesh, Meter, Structure, Texture, file::SceneFile};
 
 /// A scene in memory: everything resolved, checked and in SI units. Plain data; the plugin keeps it
 /// in [`CurrentScene`](crate::plugin::CurrentScene) and spreads it over entities.
@@ -40,7 +40,14 @@ pub struct Scene {
     pub transport: Transport,
     /// What a user should know: assumptions, suspicious sizes, parts that were skipped.
     pub warnings: Vec<String>,
+    /// What stands in its file; nothing of what has no file of ours.
+    pub written: Written,
 }
+
+/// What a scene's file says, word for word: forms show and change it
+/// ([`fields`](crate::attach::fields)). Nobody computes with it.
+#[derive(Debug, Clone, Default)]
+pub struct Written(pub(crate) Arc<SceneFile>);
 
 /// How far light is followed.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]

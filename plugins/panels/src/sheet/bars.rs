@@ -7,7 +7,7 @@ use intrados_damage::{
 };
 use intrados_predict::Predicted;
 
-use crate::{colours, number::plus_minus};
+use crate::{colours, moment::Course, number::plus_minus};
 
 /// Height of the bars, points.
 const HEIGHT: f32 = 60.0;
@@ -57,4 +57,33 @@ pub(super) fn bars(ui: &mut Ui, predicted: &Predicted) {
         ));
     }
     ui.weak("from the start of the axis to its end; lines: 95 % intervals; paler: forecast; hatched: unknown");
+}
+
+/// Damage that is foretold, zone by zone: of now on the left, of the end of the forecast on the
+/// right.
+pub(super) fn two(ui: &mut Ui, course: &Course) {
+    let size = vec2(ui.available_width().min(420.0), 0.6 * HEIGHT);
+    let (rect, response) = ui.allocate_exact_size(size, Sense::hover());
+    let name = format!("Forecast now and in {:.0} years", course.years);
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, &name));
+    ui.painter().rect_filled(rect, 1.0, ui.visuals().extreme_bg_color);
+    let width = rect.width() / ZONES as f32;
+    for zone in 0..ZONES {
+        for (side, damage) in [course.now[zone], course.later[zone]].into_iter().enumerate() {
+            let left = rect.left() + width * (zone as f32 + 0.5 * side as f32) + 1.0;
+            let high = rect.height() * damage.clamp(0.02, 1.0) as f32;
+            let column = Rect::from_min_max(
+                pos2(left, rect.bottom() - high),
+                pos2(left + 0.5 * width - 2.0, rect.bottom()),
+            );
+            let ink = colours::damage_ink(damage as f32, true);
+            ui.painter().rect_filled(column, 0.0, ink);
+        }
+    }
+    if let Some(at) = response.hover_pos() {
+        let zone = (((at.x - rect.left()) / width) as usize).min(ZONES - 1);
+        let (now, later) = (course.now[zone], course.later[zone]);
+        response.on_hover_text(format!("{}: {now:.2} now, {later:.2} then", place(zone)));
+    }
+    ui.weak(format!("each zone by the forecast: left now, right in {:.0} years", course.years));
 }

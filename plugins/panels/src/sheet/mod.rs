@@ -7,6 +7,7 @@ mod evidence;
 mod faces;
 mod links;
 mod overview;
+mod properties;
 
 use bevy_ecs::prelude::*;
 use egui::{RichText, Ui};
@@ -18,10 +19,12 @@ use capacity::Mechanics;
 
 use crate::{
     Action, Actions, Latest, Selection, colours,
+    moment::Course,
     number::{copied, plus_minus},
 };
 
 pub(crate) use evidence::Listing;
+pub(crate) use properties::Properties;
 
 /// Draws it.
 pub(crate) fn member(
@@ -31,18 +34,21 @@ pub(crate) fn member(
     selection: Res<Selection>,
     mut mechanics: Mechanics,
     mut listing: ResMut<Listing>,
+    mut properties: ResMut<Properties>,
     mut actions: ResMut<Actions>,
 ) {
     let Some(scene) = scene else { return };
     let scene = &scene.0;
     let Some((index, member)) = selection.0.and_then(|i| Some((i, scene.members.get(i)?))) else {
         overview::overview(ui, scene, &latest, &mut actions);
+        properties.bypass_change_detection().show(ui, scene, None, &mut actions);
         return;
     };
     head(ui, member);
     // Above what grows while it is predicted: a button stays where it is.
     ways(ui, scene, member, &mut actions);
     standing(ui, index, &latest, &mut actions);
+    properties.bypass_change_detection().show(ui, scene, Some(member), &mut actions);
     let result = latest.result_for(scene);
     let told = result.and_then(|r| r.members.get(index));
     if let Some(predicted) = latest.member(index) {
@@ -70,10 +76,15 @@ pub(crate) fn member(
 
 /// A part of the sheet under its name.
 fn section(ui: &mut Ui, name: &str, draw: impl FnOnce(&mut Ui)) {
+    part(ui, name, true, draw);
+}
+
+/// The same, which may be closed at first.
+fn part(ui: &mut Ui, name: &str, is_open: bool, draw: impl FnOnce(&mut Ui)) {
     ui.add_space(4.0);
     egui::CollapsingHeader::new(RichText::new(name).strong())
         .id_salt(name)
-        .default_open(true)
+        .default_open(is_open)
         .show_unindented(ui, draw);
 }
 
@@ -196,6 +207,14 @@ fn foretold(ui: &mut Ui, told: &MemberPrediction) {
     let value = plus_minus(forecast.damage, forecast.std_error, "");
     copied(ui, RichText::new(format!("d = {}", value.trim())));
     ui.label(&forecast.basis);
+    if let Some(course) = Course::of(told) {
+        let (zone, now, later) = course.worst();
+        let years = course.years;
+        ui.label(format!(
+            "In {years:.0} years it loses most in {zone} of the axis: d = {now:.2} becomes {later:.2}."
+        ));
+        bars::two(ui, &course);
+    }
     let rust = forecast.details.get("rust");
     let Some(rust) = rust else { return };
     if let Some(why) = rust["why_not"].as_str() {

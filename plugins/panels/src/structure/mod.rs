@@ -6,15 +6,22 @@ mod model;
 mod section;
 mod spot;
 
+use std::sync::Arc;
+
 use bevy_ecs::prelude::*;
 use egui::{Rect, Ui, vec2};
 use glam::Vec3;
 use intrados_scene::{Scene, plugin::CurrentScene};
 use measure::Tape;
+use model::Scale;
 use section::Section;
 pub(crate) use spot::Spot;
 
-use crate::{Action, Actions, Latest, Selection, attach::Form};
+use crate::{
+    Action, Actions, Latest, Selection,
+    attach::Form,
+    moment::{self, Moment, Seen},
+};
 
 /// Where the structure is looked at from.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -44,12 +51,14 @@ pub(crate) struct Structure {
     section: Option<Section>,
     tape: Tape,
     wished: Option<View>,
+    moment: Moment,
 }
 
 impl Default for Structure {
     fn default() -> Self {
         let (model, tape) = (model::Model::default(), Tape::default());
-        Self { model, names: true, section: None, tape, wished: None }
+        let moment = Moment::default();
+        Self { model, names: true, section: None, tape, wished: None, moment }
     }
 }
 
@@ -61,6 +70,21 @@ impl Structure {
     /// The place on a member that is at a point of the window, while the picture is in sight.
     pub(crate) fn spot(&self, at: egui::Pos2) -> Option<Spot> {
         self.model.spot(at)
+    }
+}
+
+/// The picture of a structure of which nothing is known yet.
+pub(crate) struct Preview(model::Model);
+
+impl Default for Preview {
+    fn default() -> Self {
+        Self(model::Model { is_bare: true, ..model::Model::default() })
+    }
+}
+
+impl Preview {
+    pub(crate) fn show(&mut self, ui: &mut Ui, rect: Rect, scene: &Arc<Scene>) {
+        self.0.show(ui, rect, scene, &[], Scale::DAMAGE, Selection(None), None);
     }
 }
 
@@ -82,25 +106,56 @@ pub(crate) fn structure(
         structure.model.go(view, scene, member);
     }
     let section = structure.section;
-    let pointed = structure.model.show(ui, rect, scene, &latest, *selection, section);
+    // Of a prediction that is not there yet nothing is foretold.
+    let years = moment::years(scene, &latest);
+    let when = if years.is_some() { structure.moment } else { Moment::Now };
+    let seen = when.seen(scene, &latest);
+    let scale = if when == Moment::Added { Scale::ADDED } else { Scale::DAMAGE };
+    let pointed = structure.model.show(ui, rect, scene, &seen, scale, *selection, section);
     let Some(pointed) = pointed else { return };
     if structure.names {
-        structure.model.names(ui, rect, scene, &latest, *selection, &pointed.camera);
+        let value = |i: usize| match when {
+            Moment::Now => latest.member(i).map(|p| p.damage.value),
+            Moment::Ahead | Moment::Added => seen.get(i).and_then(Seen::most),
+        };
+        structure.model.names(ui, rect, scene, &value, *selection, &pointed.camera);
     }
     compass::draw(ui, rect, &pointed.camera);
     structure.tape.draw(ui, rect, &pointed.camera);
-    point(structure, scene, &latest, pointed, form.bypass_change_detection(), &mut actions);
+    let shown = Shown { latest: &latest, seen: &seen, when, years };
+    point(structure, scene, &shown, pointed, form.bypass_change_detection(), &mut actions);
     let bar = Rect::from_min_size(rect.min + vec2(8.0, 8.0), vec2(rect.width() - 16.0, 24.0));
     ui.scope_builder(egui::UiBuilder::new().max_rect(bar), |ui| {
-        ui.vertical(|ui| tools(ui, structure, *selection, &mut actions));
+        ui.vertical(|ui| tools(ui, structure, *selection, years, &mut actions));
     });
+}
+
+/// What is shown, and when that is.
+struct Shown<'a> {
+    latest: &'a Latest,
+    seen: &'a [Seen],
+    when: Moment,
+    years: Option<f64>,
+}
+
+impl Shown<'_> {
+    /// What is to be said of a place beside how it is now.
+    fn later(&self, spot: &Spot) -> String {
+        let value = self.seen.get(spot.member).and_then(|s| s.zones[spot.zone]);
+        let (Some(value), Some(years)) = (value, self.years) else { return String::new() };
+        match self.when {
+            Moment::Now => String::new(),
+            Moment::Ahead => format!("In {years:.0} years: d = {value:.2} at least"),
+            Moment::Added => format!("{years:.0} years add {value:.2}, by the forecast"),
+        }
+    }
 }
 
 /// What a click does: it selects a member, or says where on it evidence is, or holds the tape.
 fn point(
     structure: &mut Structure,
     scene: &Scene,
-    latest: &Latest,
+    shown: &Shown<'_>,
     pointed: model::Pointed,
     form: &mut Form,
     actions: &mut Actions,
@@ -123,12 +178,21 @@ fn point(
         actions.ask(Action::Frame);
     }
     if let Some(spot) = under {
-        response.on_hover_ui_at_pointer(|ui| model::said(ui, scene, latest, &spot));
+        let later = shown.later(&spot);
+        response.on_hover_ui_at_pointer(|ui| {
+            model::said(ui, scene, shown.latest, &spot, &later);
+        });
     }
 }
 
 /// Where to look from, what is shown, and the tools that are out.
-fn tools(ui: &mut Ui, structure: &mut Structure, selection: Selection, actions: &mut Actions) {
+fn tools(
+    ui: &mut Ui,
+    structure: &mut Structure,
+    selection: Selection,
+    years: Option<f64>,
+    actions: &mut Actions,
+) {
     let frame = egui::Frame::popup(ui.style()).inner_margin(4);
     frame.show(ui, |ui| {
         ui.horizontal(|ui| {
@@ -147,6 +211,9 @@ fn tools(ui: &mut Ui, structure: &mut Structure, selection: Selection, actions: 
             }
         });
     });
+    if let Some(years) = years {
+        frame.show(ui, |ui| ui.horizontal(|ui| moments(ui, &mut structure.moment, years)));
+    }
     let bounds = structure.model.bounds();
     if let Some(section) = &mut structure.section {
         frame.show(ui, |ui| ui.horizontal(|ui| section.tools(ui, bounds)));
@@ -161,6 +228,18 @@ fn tools(ui: &mut Ui, structure: &mut Structure, selection: Selection, actions: 
             })
         });
     }
+}
+
+/// When it is looked at.
+fn moments(ui: &mut Ui, moment: &mut Moment, years: f64) {
+    let hint = "Damage as it is known now";
+    ui.selectable_value(moment, Moment::Now, "Now").on_hover_text(hint);
+    let hint = "What is known now, and more where the forecast says more. Only the end of the forecast was computed: there is nothing between.";
+    let ahead = format!("In {years:.0} years");
+    ui.selectable_value(moment, Moment::Ahead, ahead).on_hover_text(hint);
+    let hint = "Damage at the end of the forecast less that of now, both by the forecast";
+    let added = format!("What {years:.0} years add");
+    ui.selectable_value(moment, Moment::Added, added).on_hover_text(hint);
 }
 
 fn views(ui: &mut Ui, structure: &mut Structure, selection: Selection, actions: &mut Actions) {

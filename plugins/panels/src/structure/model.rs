@@ -4,10 +4,7 @@ use std::sync::Arc;
 
 use egui::{Align2, Color32, Rect, Sense, TextureHandle, TextureOptions, Ui, pos2, vec2};
 use glam::Vec3;
-use intrados_damage::{
-    verdict::Basis,
-    zone::{ZONES, place as place_of},
-};
+use intrados_damage::zone::place as place_of;
 use intrados_report::surface::{Facet, facets};
 use intrados_scene::{Camera, Scene};
 use rayon::prelude::*;
@@ -15,6 +12,7 @@ use rayon::prelude::*;
 use super::{section::Section, spot::Spot};
 use crate::{
     Latest, Selection, colours,
+    moment::Seen,
     number::plus_minus,
     surface::{Drawn, Surface, bounds, draw, hand, place},
 };
@@ -37,9 +35,26 @@ const MOST_NAMES: usize = 40;
 /// Width of the legend, points.
 const LEGEND: f32 = 92.0;
 
+/// What colours mean.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Scale {
+    pub(super) name: &'static str,
+    /// The value of the last colour.
+    pub(super) top: f64,
+}
+
+impl Scale {
+    /// Of damage as it is.
+    pub(super) const DAMAGE: Self = Self { name: "damage d", top: 1.0 };
+    /// Of what years add, which is less.
+    pub(super) const ADDED: Self = Self { name: "d is added", top: 0.4 };
+}
+
 /// What is remembered between frames.
 #[derive(Default)]
 pub(super) struct Model {
+    /// Nothing is known of it: there is no scale of damage.
+    pub(super) is_bare: bool,
     /// Hash of the scene that the facets are of.
     of: String,
     facets: Arc<Vec<Facet>>,
@@ -59,8 +74,8 @@ struct Shown {
 
 #[derive(Clone, PartialEq)]
 struct Key {
-    damage: Vec<[Option<f64>; ZONES]>,
-    forecast: Vec<[bool; ZONES]>,
+    seen: Vec<Seen>,
+    scale: Scale,
     selection: Selection,
     camera: Camera,
     size: [usize; 2],
@@ -84,7 +99,8 @@ impl Model {
         ui: &mut Ui,
         rect: Rect,
         scene: &Arc<Scene>,
-        latest: &Latest,
+        seen: &[Seen],
+        scale: Scale,
         selection: Selection,
         section: Option<Section>,
     ) -> Option<Pointed> {
@@ -100,7 +116,8 @@ impl Model {
         let (width, height) = (rect.width().max(8.0) as u32, rect.height().max(8.0) as u32);
         let response = ui.allocate_rect(rect, Sense::click_and_drag());
         response.widget_info(|| {
-            egui::WidgetInfo::labeled(egui::Role::Image, true, "Damage of members")
+            let name = if self.is_bare { "Preview" } else { "Damage of members" };
+            egui::WidgetInfo::labeled(egui::Role::Image, true, name)
         });
         let camera = match &self.camera {
             Some(camera) => Camera { width, height, ..camera.clone() },
@@ -110,12 +127,14 @@ impl Model {
         let camera = hand(ui, &response, rect, camera);
         let is_moving = response.dragged() || camera != before;
         self.camera = Some(camera.clone());
-        self.redraw(ui, rect, latest, selection, camera.clone(), section, is_moving);
+        self.redraw(ui, rect, seen, scale, selection, camera.clone(), section, is_moving);
         let shown = self.shown.as_ref()?;
         let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
         ui.painter().image(shown.texture.id(), rect, whole, Color32::WHITE);
-        legend(ui, rect);
-        scale(ui, rect, &camera);
+        if !self.is_bare {
+            legend(ui, rect, scale);
+        }
+        ruler(ui, rect, &camera);
         let under = response.hover_pos().and_then(|at| shown.spot(at));
         Some(Pointed { response, under, camera })
     }
@@ -140,7 +159,8 @@ impl Model {
         let is_alike = !positions.is_empty() && bounds(&positions) == bounds(&self.positions);
         let camera = self.camera.take().filter(|_| is_alike);
         let facets = Arc::new(facets);
-        *self = Self { of: scene.hash.clone(), facets, positions, camera, ..Self::default() };
+        let (of, is_bare) = (scene.hash.clone(), self.is_bare);
+        *self = Self { is_bare, of, facets, positions, camera, shown: None };
     }
 
     /// Looks from another place, so that what is wanted fills the picture.
@@ -169,14 +189,14 @@ impl Model {
         ui: &Ui,
         rect: Rect,
         scene: &Scene,
-        latest: &Latest,
+        value: &dyn Fn(usize) -> Option<f64>,
         selection: Selection,
         camera: &Camera,
     ) {
         let font = egui::TextStyle::Small.resolve(ui.style());
         let painter = ui.painter().with_clip_rect(rect);
         let worth = |i: usize| {
-            let damage = latest.member(i).map_or(-1.0, |p| p.damage.value);
+            let damage = value(i).unwrap_or(-1.0);
             if selection.0 == Some(i) { 2.0 } else { damage }
         };
         let mut order: Vec<usize> = (0..scene.members.len()).collect();
@@ -188,8 +208,8 @@ impl Model {
             }
             let Some(middle) = self.middle(index) else { continue };
             let at = place(camera, rect, middle);
-            let text = match latest.member(index) {
-                Some(p) => format!("{}  {:.2}", scene.members[index].name, p.damage.value),
+            let text = match value(index) {
+                Some(d) => format!("{}  {d:.2}", scene.members[index].name),
                 None => format!("{}  ?", scene.members[index].name),
             };
             let ink = Color32::from_gray(245);
@@ -234,27 +254,22 @@ impl Model {
         &mut self,
         ui: &Ui,
         rect: Rect,
-        latest: &Latest,
+        seen: &[Seen],
+        scale: Scale,
         selection: Selection,
         camera: Camera,
         section: Option<Section>,
         held: bool,
     ) {
         let members = self.facets.iter().map(|f| f.member + 1).max().unwrap_or(0);
-        let zones = |member: usize| {
-            latest.member(member).map_or([None; ZONES], |p| p.zones.0.map(|r| r.map(|r| r.value)))
-        };
+        let of = |member: usize| seen.get(member).copied().unwrap_or_default();
         let density = ui.ctx().pixels_per_point();
         let size =
             [rect.width() * density, rect.height() * density].map(|n| (n as usize).clamp(8, 4096));
         // Fine when nobody moves it.
-        let forecast = |member: usize| {
-            latest.member(member).map_or([false; ZONES], |p| p.basis.map(|b| b == Basis::Forecast))
-        };
-        let forecast = (0..members).map(forecast).collect();
         let key = Key {
-            damage: (0..members).map(zones).collect(),
-            forecast,
+            seen: (0..members).map(of).collect(),
+            scale,
             selection,
             camera,
             size,
@@ -267,8 +282,10 @@ impl Model {
         let cut = section.map(|s| Arc::new(s.cut(&self.facets, bounds(&self.positions))));
         let facets = cut.unwrap_or_else(|| Arc::clone(&self.facets));
         let value = |f: &Facet| {
-            let damage = key.damage[f.member][f.zone].map_or(f32::NAN, |d| d as f32);
-            let damage = if key.forecast[f.member][f.zone] { damage + FORECAST } else { damage };
+            let seen = &key.seen[f.member];
+            let share = |d: f64| (d / scale.top).min(1.0) as f32;
+            let damage = seen.zones[f.zone].map_or(f32::NAN, share);
+            let damage = if seen.foretold[f.zone] { damage + FORECAST } else { damage };
             if selection.0.is_some_and(|s| s != f.member) { damage + ASIDE } else { damage }
         };
         let values: Vec<f32> = facets.iter().flat_map(|f| [value(f); 3]).collect();
@@ -418,7 +435,7 @@ fn colour(value: f32) -> [u8; 3] {
     colours::damage(value, is_forecast).map(|c| (f32::from(c) * dim) as u8)
 }
 
-pub(super) fn said(ui: &mut Ui, scene: &Scene, latest: &Latest, spot: &Spot) {
+pub(super) fn said(ui: &mut Ui, scene: &Scene, latest: &Latest, spot: &Spot, later: &str) {
     let Some(member) = scene.members.get(spot.member) else { return };
     ui.strong(&member.name);
     let zone = latest.member(spot.member).and_then(|p| p.zones.0[spot.zone]);
@@ -433,10 +450,13 @@ pub(super) fn said(ui: &mut Ui, scene: &Scene, latest: &Latest, spot: &Spot) {
         }
         None => ui.weak("Nothing is known of it yet; that is not the same as sound."),
     };
+    if !later.is_empty() {
+        ui.label(later);
+    }
 }
 
 /// A length in the picture, at the distance of its middle: nearer things are larger.
-fn scale(ui: &Ui, rect: Rect, camera: &Camera) {
+fn ruler(ui: &Ui, rect: Rect, camera: &Camera) {
     let distance = (camera.target - camera.position).length();
     let width = 2.0 * camera.half_extent()[0] * distance;
     let metre = rect.width() / width.max(1e-6);
@@ -463,7 +483,7 @@ fn scale(ui: &Ui, rect: Rect, camera: &Camera) {
 }
 
 /// Colours with their damages, and what has none.
-pub(super) fn legend(ui: &Ui, rect: Rect) {
+pub(super) fn legend(ui: &Ui, rect: Rect, scale: Scale) {
     const STEPS: usize = 48;
     let height = (rect.height() * 0.28).clamp(50.0, 220.0);
     let back = Rect::from_min_size(
@@ -488,14 +508,16 @@ pub(super) fn legend(ui: &Ui, rect: Rect) {
     };
     for tick in [0.0, 0.25, 0.5, 0.75, 1.0] {
         let at = pos2(bar.right() + 5.0, y(tick));
+        let is_whole = scale.top >= 1.0;
         let word = match tick {
-            0.0 => "0 sound".to_owned(),
-            1.0 => "1 lost".to_owned(),
-            _ => format!("{tick}"),
+            0.0 if is_whole => "0 sound".to_owned(),
+            1.0 if is_whole => "1 lost".to_owned(),
+            1.0 => format!("{} or more", scale.top),
+            _ => format!("{}", tick * scale.top),
         };
         write(at, Align2::LEFT_CENTER, &word);
     }
-    write(back.min + vec2(8.0, 6.0), Align2::LEFT_TOP, "damage d");
+    write(back.min + vec2(8.0, 6.0), Align2::LEFT_TOP, scale.name);
     let mut patch = Rect::from_min_size(bar.left_bottom() + vec2(0.0, 10.0), vec2(14.0, 10.0));
     for (colour, word) in [
         (colours::damage_ink(f32::NAN, false), "unknown"),

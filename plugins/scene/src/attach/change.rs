@@ -1,4 +1,4 @@
-//! Changes of evidence that can be taken back and made again: the text before and after, and the
+//! Changes of evidence, and of a scene's file, that can be taken back and made again: the text before and after, and the
 //! copies that lay beside the scene in one of the two.
 
 use std::{
@@ -15,7 +15,8 @@ use super::{AttachError, Detached, Project, lock::Lock, text_of, write};
 #[derive(Debug)]
 pub struct Change {
     folder: PathBuf,
-    evidence: PathBuf,
+    /// What was written: the evidence, or the scene.
+    file: PathBuf,
     /// The text without it and with it; none: there is no file.
     texts: [Option<String>; 2],
     copies: Vec<PathBuf>,
@@ -42,10 +43,18 @@ impl Change {
         adds: bool,
         kept: TempDir,
     ) -> Result<Self, AttachError> {
-        let evidence = project.evidence();
-        let texts = [project.text.clone(), text_of(&evidence)?];
+        let file = project.evidence();
+        let texts = [project.text.clone(), text_of(&file)?];
         let folder = project.folder.clone();
-        Ok(Self { folder, evidence, texts, copies, adds, kept, is_made: true })
+        Ok(Self { folder, file, texts, copies, adds, kept, is_made: true })
+    }
+
+    /// The scene's file was written over: its texts before and after.
+    pub(super) fn written(project: &Project, texts: [String; 2]) -> Result<Self, AttachError> {
+        let (folder, file) = (project.folder.clone(), project.scene.clone());
+        let kept = kept(&folder)?;
+        let (texts, copies) = (texts.map(Some), Vec::new());
+        Ok(Self { folder, file, texts, copies, adds: true, kept, is_made: true })
     }
 
     /// Whether it is made now, or taken back.
@@ -54,17 +63,17 @@ impl Change {
         self.is_made
     }
 
-    /// Takes it back, or makes it again: the evidence is the same to the byte as it was then.
+    /// Takes it back, or makes it again: the file is the same to the byte as it was then.
     ///
     /// # Errors
-    /// Somebody has changed the evidence since, or it cannot be written; then nothing has changed.
+    /// Somebody has changed the file since, or it cannot be written; then nothing has changed.
     pub fn turn(&mut self, job: &Job) -> Result<(), AttachError> {
         let _lock = Lock::take(&self.folder, job)?;
         let [without, with] = &self.texts;
         let (from, to) = if self.is_made { (with, without) } else { (without, with) };
-        if text_of(&self.evidence)? != *from {
+        if text_of(&self.file)? != *from {
             let why = "has been changed since: what came before that cannot be taken back";
-            return Err(AttachError::CannotWrite(format!("{}: {why}", self.evidence.display())));
+            return Err(AttachError::CannotWrite(format!("{}: {why}", self.file.display())));
         }
         let are_there = self.is_made == self.adds;
         for (number, copy) in self.copies.iter().enumerate() {
@@ -73,9 +82,8 @@ impl Change {
             bring(from, to)?;
         }
         match to {
-            Some(text) => write(&self.evidence, text)?,
-            None => fs::remove_file(&self.evidence)
-                .map_err(|e| AttachError::write(&self.evidence, &e))?,
+            Some(text) => write(&self.file, text)?,
+            None => fs::remove_file(&self.file).map_err(|e| AttachError::write(&self.file, &e))?,
         }
         self.is_made = !self.is_made;
         if are_there {

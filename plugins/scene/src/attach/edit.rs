@@ -157,7 +157,7 @@ fn layout(text: &str) -> Option<Layout> {
 }
 
 /// The end of what begins at `at`: a comment, a string, a word, white space, or one character.
-fn token(text: &str, at: usize) -> Option<usize> {
+pub(super) fn token(text: &str, at: usize) -> Option<usize> {
     let rest = text.get(at..)?;
     let length = match rest.as_bytes() {
         [b'/', b'/', ..] => rest.find('\n').unwrap_or(rest.len()),

@@ -3,14 +3,19 @@
 //!
 //! [`Project::propose`] copies files aside and loads the scene as it would be, so that everything
 //! wrong is known before anything changes; [`Proposal::commit`] puts it in place. `evidence.ron` is
-//! edited as text: comments and order stay.
+//! edited as text: comments and order stay. So is the scene's own file by [`Project::amend`], which
+//! writes what a form has changed of its [`fields`].
 
+mod amend;
 mod change;
+mod draft;
 mod edit;
+mod fields;
 mod listed;
 mod load_test;
 mod lock;
 mod raw;
+mod tree;
 
 use std::{
     collections::HashSet,
@@ -28,7 +33,10 @@ use serde::Serialize;
 use tempfile::TempDir;
 
 pub use crate::file::evidence::{Along, Face, Finding, Kind};
+pub use amend::Setting;
 pub use change::Change;
+pub use draft::Draft;
+pub use fields::{Field, FieldKind, fields};
 pub use listed::{Listed, listed};
 pub use raw::{Raw, VoxelType, VoxelTypeError};
 

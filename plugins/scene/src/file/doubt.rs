@@ -9,7 +9,7 @@ use super::*;
 const MUCH_STEEL: f32 = 0.04;
 
 /// Strength classes of EN 206, table 12, and the two that BS 8500-1 adds.
-const CLASSES: [&str; 18] = [
+pub(crate) const CLASSES: [&str; 18] = [
     "C8/10", "C12/15", "C16/20", "C20/25", "C25/30", "C28/35", "C30/37", "C32/40", "C35/45",
     "C40/50", "C45/55", "C50/60", "C55/67", "C60/75", "C70/85", "C80/95", "C90/105", "C100/115",
 ];

@@ -35,7 +35,7 @@ use crate::{problem::Problem, scene::Transport, structure::*};
 pub use check::check;
 pub(crate) use check::concrete_class;
 pub(crate) use check::unknown_members;
-pub(crate) use doubt::doubts;
+pub(crate) use doubt::{CLASSES, doubts};
 pub(crate) use image::MAX_TEXELS;
 pub use member::{Assumed, Detail, Grading, Member, Slices};
 pub(crate) use obj::obj_groups;

@@ -1,0 +1,126 @@
+//! Values of a scene's file in a form: what is written, what has been typed, and what that changes.
+
+use egui::{Grid, RichText, ScrollArea, TextEdit, Ui};
+use intrados_scene::attach::{Field, FieldKind, Setting};
+
+/// Width of a field, points, and of one that holds words.
+const WIDTHS: (f32, f32) = (70.0, 120.0);
+/// So many changed fields are named in the line that can be undone.
+const NAMED: usize = 3;
+
+/// Fields, and what has been typed into each.
+#[derive(Debug, Default)]
+pub(crate) struct Values {
+    fields: Vec<Field>,
+    texts: Vec<String>,
+}
+
+impl Values {
+    pub(crate) fn new(fields: Vec<Field>) -> Self {
+        let texts = fields.iter().map(|f| f.value.clone()).collect();
+        Self { fields, texts }
+    }
+
+    pub(crate) fn is_empty(&self) -> bool {
+        self.fields.is_empty()
+    }
+
+    /// Back to what is written.
+    pub(crate) fn discard(&mut self) {
+        *self = Self::new(std::mem::take(&mut self.fields));
+    }
+
+    /// How many are not as they are written.
+    pub(crate) fn changed(&self) -> usize {
+        self.pairs().count()
+    }
+
+    fn pairs(&self) -> impl Iterator<Item = (&Field, &String)> {
+        self.fields.iter().zip(&self.texts).filter(|(field, text)| field.value != text.trim())
+    }
+
+    /// What is to be written, and the names of what changes; or what has to be typed otherwise.
+    pub(crate) fn settings(&self) -> Result<(Vec<Setting>, String), String> {
+        let mut settings = Vec::new();
+        let mut names: Vec<&str> = Vec::new();
+        for (field, text) in self.pairs() {
+            settings.extend(field.set(text)?);
+            names.push(&field.name);
+        }
+        let more = names.len().saturating_sub(NAMED);
+        names.truncate(NAMED);
+        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+        Ok((settings, names.join(", ") + &more))
+    }
+
+    /// Draws them by their groups, names on the left.
+    pub(crate) fn show(&mut self, ui: &mut Ui) {
+        let mut from = 0;
+        while let Some(first) = self.fields.get(from) {
+            let group = first.group.clone();
+            let own = self.fields[from..].iter().take_while(|f| f.group == group).count();
+            let range = from..from + own;
+            // What concerns all of a group is said once.
+            let is_common = self.fields[range.clone()].iter().all(|f| f.note == first.note);
+            let common = first.note.clone();
+            ui.horizontal_wrapped(|ui| {
+                ui.label(RichText::new(&group).strong());
+                if is_common && own > 1 {
+                    ui.weak(common);
+                }
+            });
+            let column = (0.5 * ui.available_width() - 6.0).max(60.0);
+            let grid = Grid::new(&group).num_columns(2).max_col_width(column);
+            grid.spacing([8.0, 3.0]).show(ui, |ui| {
+                let rows = self.fields[range.clone()].iter().zip(&mut self.texts[range]);
+                rows.for_each(|(field, text)| row(ui, field, text));
+            });
+            from += own;
+        }
+    }
+}
+
+/// A value with its name and its unit.
+fn row(ui: &mut Ui, field: &Field, text: &mut String) {
+    let is_changed = field.value != text.trim();
+    let name = RichText::new(&field.name);
+    let label = ui.label(if is_changed { name.strong() } else { name });
+    let label =
+        if field.note.is_empty() { label } else { label.on_hover_text(field.note.as_str()) };
+    ui.horizontal(|ui| {
+        let is_word = matches!(field.kind, FieldKind::Text | FieldKind::OneOf(_));
+        let width = if is_word { WIDTHS.1 } else { WIDTHS.0 };
+        let choice = if matches!(field.kind, FieldKind::OneOf(_)) { 26.0 } else { 0.0 };
+        let width = width.min(ui.available_width() - choice).max(40.0);
+        let hint = if field.kind == FieldKind::Day { "2026-05-03" } else { field.note.as_str() };
+        let edit = TextEdit::singleline(text).desired_width(width).hint_text(hint);
+        let response = ui.add(edit).labelled_by(label.id);
+        if !field.note.is_empty() {
+            response.on_hover_text(field.note.as_str());
+        }
+        if let FieldKind::OneOf(names) = &field.kind {
+            choose(ui, &field.name, names, text);
+        }
+        if !field.unit.is_empty() {
+            ui.label(field.unit);
+        }
+    });
+    ui.end_row();
+}
+
+/// A list of what is usual.
+fn choose(ui: &mut Ui, of: &str, names: &[String], text: &mut String) {
+    let button = egui::containers::menu::MenuButton::new("⏷");
+    let (response, _) = button.ui(ui, |ui| {
+        ScrollArea::vertical().max_height(260.0).show(ui, |ui| {
+            for name in names {
+                if ui.selectable_label(text == name, name).clicked() {
+                    text.clone_from(name);
+                    ui.close();
+                }
+            }
+        });
+    });
+    let hint = format!("Choose {of}");
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, &hint));
+}

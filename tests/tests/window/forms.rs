@@ -1,0 +1,182 @@
+//! Forms: what a scene's file says is changed in the sheet and written there.
+
+use std::fs;
+
+use bevy_ecs::world::World;
+use egui::{Key, accesskit::Role};
+use egui_kittest::kittest::Queryable;
+use intrados_panels::{Action, Latest, Selection};
+use intrados_scene::plugin::CurrentScene;
+
+use intrados_predict::{PredictSettings, Predicting};
+
+use super::{LONELY, Window, type_into};
+
+/// A crack that somebody has seen: something to predict without a life, which takes long.
+const SEEN: &str = r#"(
+    schema: "intrados.evidence/1",
+    items: [(member: "C1", name: "crack 1", date: "2026-05-03", along: 0.4, face: Front, shows: Crack(width_mm: 0.4, course: Along))],
+)"#;
+
+/// A window with a column, and what has been seen of it.
+fn with_seen() -> (Window, tempfile::TempDir) {
+    let folder = tempfile::tempdir().expect("a folder for the scene");
+    let file = folder.path().join("lonely.ron");
+    fs::write(&file, LONELY).expect("written");
+    fs::write(folder.path().join("evidence.ron"), SEEN).expect("written");
+    let mut window = Window::new(|app| {
+        app.world_mut().resource_mut::<Predicting>().settings =
+            PredictSettings { forecast: None, ..PredictSettings::default() };
+    });
+    window.ask(Action::Open(file));
+    (window, folder)
+}
+
+/// Whether anything in the window has this text in its name.
+fn has(window: &Window, text: &str) -> bool {
+    window.harness.query_all_by_label_contains(text).next().is_some()
+}
+
+/// How wide the column is, m.
+fn width(world: &mut World) -> f32 {
+    let [low, high] = world.resource::<CurrentScene>().0.members[0].bounds;
+    high.x - low.x
+}
+
+fn is(world: &mut World, wide: f32) -> bool {
+    (width(world) - wide).abs() < 1e-4
+}
+
+/// Opens the form of the selected member.
+fn opened(window: &mut Window) {
+    window.until("the prediction", |w| {
+        w.get_resource::<Latest>().is_some_and(|l| l.result.is_some())
+    });
+    window.ask(Action::Select(Some(0)));
+    window.frames(2);
+    window.click("Concrete, size, bars, loads");
+    window.until_seen("Apply");
+    window.frames(20);
+}
+
+/// A size and a class are changed: old numbers are outdated, the file has the new ones and all of
+/// its comments, and Ctrl+Z brings the old ones back to the byte.
+#[test]
+fn a_member_is_changed_in_its_sheet_and_changed_back() {
+    let (mut window, folder) = with_seen();
+    let file = folder.path().join("lonely.ron");
+    opened(&mut window);
+    type_into(&mut window, "width", "0,5");
+    type_into(&mut window, "concrete class", "C35/45");
+    assert!(has(&window, "2 values changed"));
+    window.click("Apply");
+    window.until("the wider column", |w| is(w, 0.5));
+    window.frame();
+    assert!(has(&window, "⚠ Outdated"), "old numbers stand there as if nothing had happened");
+    let written = fs::read_to_string(&file).expect("the scene");
+    let expected = LONELY.replace("width_m: 0.4", "width_m: 0.5").replace("C30/37", "C35/45");
+    assert_eq!(written, expected);
+    assert_eq!(window.with(|w| *w.resource::<Selection>()), Selection(Some(0)));
+    window.harness.key_press_modifiers(egui::Modifiers::COMMAND, Key::Z);
+    window.until("the column as it was", |w| is(w, 0.4));
+    assert_eq!(fs::read_to_string(&file).expect("the scene"), LONELY);
+    window.harness.key_press_modifiers(egui::Modifiers::COMMAND | egui::Modifiers::SHIFT, Key::Z);
+    window.until("the wider column again", |w| is(w, 0.5));
+    assert_eq!(fs::read_to_string(&file).expect("the scene"), expected);
+}
+
+/// What the file would be refused for is refused with its line; nothing is written, and what was
+/// typed stays, to be mended.
+#[test]
+fn what_cannot_be_is_refused_with_the_line_of_the_file() {
+    let (mut window, folder) = with_seen();
+    let file = folder.path().join("lonely.ron");
+    opened(&mut window);
+    type_into(&mut window, "width", "wide");
+    assert!(has(&window, "width: “wide” is no number"));
+    type_into(&mut window, "width", "-0.4");
+    window.click("Apply");
+    window.until_seen("Copy details");
+    assert!(has(&window, "Nothing was changed"));
+    assert!(has(&window, "lonely.ron: members[0].body.section"));
+    assert_eq!(fs::read_to_string(&file).expect("the scene"), LONELY);
+    assert!(has(&window, "one value changed"));
+    window.click("Discard");
+    assert!(has(&window, "as in lonely.ron"));
+    assert!(window.with(|w| is(w, 0.4)));
+}
+
+/// What stands on the report's cover is filled in where no member is selected.
+#[test]
+fn the_cover_of_the_report_is_filled_in() {
+    let (mut window, folder) = with_seen();
+    window.until("a scene", |w| w.contains_resource::<CurrentScene>());
+    window.frames(2);
+    window.click("Owner, inspection, air");
+    window.until_seen("Apply");
+    window.frames(20);
+    type_into(&mut window, "owner", "The county");
+    type_into(&mut window, "inspected on", "2026-05-03");
+    window.click("Apply");
+    let owner = |w: &mut World| w.resource::<CurrentScene>().0.structure.project.owner.clone();
+    window.until("the owner", |w| owner(w) == "The county");
+    let written = fs::read_to_string(folder.path().join("lonely.ron")).expect("the scene");
+    assert!(written.contains("project: (owner: \"The county\", inspected: \"2026-05-03\"),"));
+}
+
+/// A scene that comes with the program is shown and not changed.
+#[test]
+fn a_scene_of_the_program_is_shown_and_not_changed() {
+    let mut window = super::with_column();
+    window.ask(Action::Select(Some(0)));
+    window.frames(2);
+    window.click("Concrete, size, bars, loads");
+    window.frames(20);
+    assert!(has(&window, "This scene is part of the program"));
+    assert!(has(&window, "Choose concrete class"));
+    assert!(window.harness.query_by_label("Apply").is_none());
+}
+
+/// A structure is made from a template: what is typed is seen before anything is written, what no
+/// scene may be is refused, and then its folder is there and open.
+#[test]
+fn a_new_structure_is_seen_before_it_is_made() {
+    let mut window = Window::new(|_| {});
+    let folder = tempfile::tempdir().expect("a folder");
+    window.frames(2);
+    window.click("New structure…");
+    window.until_seen("Preview");
+    window.until_seen("height");
+    let place = folder.path().join("pier");
+    type_into(&mut window, "Folder to make", &place.display().to_string());
+    type_into(&mut window, "title", "Pier 7");
+    type_into(&mut window, "height", "-4");
+    window.until_said("members[0].body");
+    assert!(!place.exists());
+    type_into(&mut window, "height", "4.5");
+    // 0.4 × 0.4 × 4.5 m³.
+    window.until_said("one member, 0.72 m³ of concrete");
+    window.harness.get_by_role_and_label(Role::Button, "Make it").click();
+    window.until("the scene", |w| w.get_resource::<CurrentScene>().is_some());
+    let scene = window.with(|w| w.resource::<CurrentScene>().0.clone());
+    assert_eq!((scene.title.as_str(), scene.path.as_path()), ("Pier 7", &*place.join("scene.ron")));
+    let [low, high] = scene.members[0].bounds;
+    assert!((high.y - low.y - 4.5).abs() < 1e-4);
+    assert!(place.join("evidence.ron").exists());
+    window.frames(2);
+    assert!(window.harness.query_by_label("Preview").is_none(), "the dialog is gone");
+}
+
+impl Window {
+    /// Frames until something has this text in its name.
+    fn until_said(&mut self, text: &str) {
+        for _ in 0..super::PATIENCE {
+            if has(self, text) {
+                return;
+            }
+            self.frame();
+            std::thread::sleep(std::time::Duration::from_millis(1));
+        }
+        panic!("{text} was not said");
+    }
+}
