@@ -4,7 +4,6 @@ use std::{
     fs::File,
     io::Read,
     path::{Path, PathBuf},
-    sync::Arc,
 };
 
 use intrados_stage::{
@@ -357,7 +356,7 @@ pub(crate) fn from_text(
     let evidence = evidence::gather(&parsed, sources, &mut problems, job)?;
     if problems.is_empty() {
         let mut scene = file::resolve(name, &parsed, &evidence, sources, job)?;
-        scene.written = Written(Arc::new(parsed));
+        scene.written = Written(text.into());
         Ok(scene)
     } else {
         Err(LoadError::BadInput(problems))

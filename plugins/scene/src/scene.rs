@@ -4,7 +4,7 @@ use glam::{Mat4, Vec3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{Camera, Lamp, Material, Member, Mesh, Meter, Structure, Texture, file::SceneFile};
+use crate::{Camera, Lamp, Material, Member, Mesh, Meter, Structure, Texture};
 
 /// A scene in memory: everything resolved, checked and in SI units. Plain data; the plugin keeps it
 /// in [`CurrentScene`](crate::plugin::CurrentScene) and spreads it over entities.
@@ -44,10 +44,10 @@ pub struct Scene {
     pub written: Written,
 }
 
-/// What a scene's file says, word for word: forms show and change it
+/// The text of a scene's file: forms show and change it
 /// ([`fields`](crate::attach::fields)). Nobody computes with it.
 #[derive(Debug, Clone, Default)]
-pub struct Written(pub(crate) Arc<SceneFile>);
+pub struct Written(pub(crate) Arc<str>);
 
 /// How far light is followed.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]

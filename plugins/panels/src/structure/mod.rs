@@ -78,7 +78,7 @@ pub(crate) struct Preview(model::Model);
 
 impl Default for Preview {
     fn default() -> Self {
-        Self(model::Model { is_bare: true, ..model::Model::default() })
+        Self(model::Model::bare())
     }
 }
 

@@ -54,7 +54,7 @@ impl Scale {
 #[derive(Default)]
 pub(super) struct Model {
     /// Nothing is known of it: there is no scale of damage.
-    pub(super) is_bare: bool,
+    is_bare: bool,
     /// Hash of the scene that the facets are of.
     of: String,
     facets: Arc<Vec<Facet>>,
@@ -93,6 +93,11 @@ pub(super) struct Pointed {
 }
 
 impl Model {
+    /// Of a structure of which nothing is known yet.
+    pub(super) fn bare() -> Self {
+        Self { is_bare: true, ..Self::default() }
+    }
+
     /// Draws it into `rect`; none: there is nothing to be seen.
     pub(super) fn show(
         &mut self,
@@ -513,7 +518,7 @@ pub(super) fn legend(ui: &Ui, rect: Rect, scale: Scale) {
             0.0 if is_whole => "0 sound".to_owned(),
             1.0 if is_whole => "1 lost".to_owned(),
             1.0 => format!("{} or more", scale.top),
-            _ => format!("{}", tick * scale.top),
+            _ => format!("{}", f64::from(tick) * scale.top),
         };
         write(at, Align2::LEFT_CENTER, &word);
     }

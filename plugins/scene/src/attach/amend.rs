@@ -5,7 +5,7 @@ use std::fmt::Write;
 use intrados_stage::Job;
 
 use super::{
-    AttachError, Change, Project, text_of,
+    AttachError, Change, Project, fields, text_of,
     tree::{self, Step},
     write,
 };
@@ -41,7 +41,7 @@ impl Project {
             file::parse(&place, text).map_err(|why| AttachError::BadInput(why.to_string()))
         };
         let before = parse(&text)?;
-        if before != *shown.written.0 {
+        if fields::said(shown).as_ref() != Some(&before) {
             let why = "has been changed since it was opened: reload the scene first";
             return Err(AttachError::CannotWrite(format!("{place}: {why}")));
         }

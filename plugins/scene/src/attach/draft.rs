@@ -46,7 +46,7 @@ impl Draft {
     #[must_use]
     pub fn fields(&self) -> Vec<Field> {
         let mut all = fields(&self.scene, None);
-        for written in &self.scene.written.0.members {
+        for written in fields::said(&self.scene).into_iter().flat_map(|file| file.members) {
             let own = self.scene.members.iter().find(|m| m.id == written.id);
             for field in own.map_or(Vec::new(), |own| fields(&self.scene, Some(own))) {
                 if !all.iter().any(|f| f.place() == field.place()) {
@@ -113,7 +113,7 @@ mod tests {
             let place = folder.path().join("new").join(kind);
             let path = draft.write(&place).unwrap();
             let scene = Scene::load(&path, &job).unwrap();
-            assert_eq!((scene.title.as_str(), scene.members.len() > 0), ("Mine", true));
+            assert_eq!((scene.title.as_str(), !scene.members.is_empty()), ("Mine", true));
             let [low, high] = scene.bounds();
             let [drawn_low, drawn_high] = draft.scene.bounds();
             assert_eq!((low, high), (drawn_low, drawn_high), "{kind}");

@@ -8,7 +8,7 @@ use super::{
 };
 use crate::{
     Member, Scene,
-    file::{Assumed, CLASSES, Detail, SceneFile},
+    file::{self, Assumed, CLASSES, Detail, SceneFile},
     structure::{Action, Bars, Body, Date, Exposure, Grade, Load, Reinforcement, Section},
 };
 
@@ -99,11 +99,8 @@ fn quoted(text: &str) -> Result<String, String> {
 /// that has no file of ours.
 #[must_use]
 pub fn fields(scene: &Scene, member: Option<&Member>) -> Vec<Field> {
-    let file = &*scene.written.0;
-    let mut list = List { file, fields: Vec::new(), group: String::new() };
-    if file.schema.is_empty() {
-        return Vec::new();
-    }
+    let Some(file) = said(scene) else { return Vec::new() };
+    let mut list = List { file: &file, fields: Vec::new(), group: String::new() };
     let Some(member) = member else {
         list.structure();
         return list.fields;
@@ -124,6 +121,11 @@ pub fn fields(scene: &Scene, member: Option<&Member>) -> Vec<Field> {
     }
     list.loads(&member.id, assembly);
     list.fields
+}
+
+/// What the file of a scene says; none: it has none of ours.
+pub(super) fn said(scene: &Scene) -> Option<SceneFile> {
+    file::parse(&scene.name, &scene.written.0).ok()
 }
 
 /// What is being listed.
@@ -472,6 +474,9 @@ impl List<'_> {
                 self.number("warmer by", "K", Some(*uniform_k), place("uniform_k"));
                 let difference = Some(*difference_k);
                 self.number("one side more by", "K", difference, place("difference_k"));
+            }
+            Action::PipeTemperature { warmer_k } => {
+                self.number("pipe warmer by", "K", Some(*warmer_k), place("warmer_k"));
             }
         }
         self.fields.iter_mut().skip(from).for_each(|f| f.note.clone_from(&whom));
