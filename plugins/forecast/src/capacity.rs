@@ -154,8 +154,8 @@ pub fn capacity(
             _ => Weakening::default(),
         });
         let is_told = is_sound || *errors == Some(0.0);
-        if let Some(raised) = prepared.raised.as_mut().filter(|_| !is_told) {
-            raised.to = Reach::Peak;
+        if let Some(raised) = &mut prepared.raised {
+            raised.to = if is_told { Reach::Mode } else { Reach::Peak };
         }
         let state = match errors {
             None => "as if it were sound",

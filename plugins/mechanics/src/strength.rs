@@ -115,9 +115,13 @@ const EARLY: f64 = 2e-5;
 const SOFT: f64 = 0.85;
 /// Short steps, over how far it has moved.
 const SHORT: f64 = 0.04;
+/// A step that took no more iterations may be followed by a longer one.
+const EASY: usize = 6;
 /// Work after the peak over that up to it, and work that is always allowed, as
 /// [`MarchSettings::work`] counts it: what falls apart has many equilibria to choose from.
 const WORK: [f64; 2] = [1.0, 5e7];
+/// The same where only how it fails is wanted.
+const MODE_WORK: [f64; 2] = [0.5, 1e7];
 /// The same where only the peak is wanted: what takes so much more for one step is past it.
 const PEAK_WORK: [f64; 2] = [0.3, 3e6];
 /// Steps, at most.
@@ -127,7 +131,7 @@ const FALLING: usize = 3;
 /// Share of the peak below which it is past that.
 const PASSED: f64 = 0.97;
 /// It is followed no further than so many times the displacement at the first yielding: until it
-/// fails, and where only the peak is wanted (what comes after that is the hardening of bars).
+/// fails, and where that is not wanted (what comes after that is the hardening of bars).
 const DUCTILE: [f64; 2] = [12.0, 4.0];
 /// Nor than so many times the displacement at the peak, once concrete is crushed or there is no steel.
 const BEYOND: f64 = 2.0;
@@ -137,9 +141,11 @@ const FAR: f64 = 0.1;
 const OBLIQUE: [f64; 2] = [20.0, 70.0];
 /// Damage of compression past its peak from which concrete counts as crushed.
 const CRUSHED: f64 = 0.3;
-/// Share of the volume that is pressed beyond what its curve rises to, from which that is what ends
-/// it.
+/// Share of a slab across the member that is pressed beyond what its curve rises to, from which that
+/// is what ends it.
 const PRESSED: f64 = 0.5;
+/// Slabs across the member: what is pressed evenly crushes in one of them.
+const SLABS: usize = 10;
 /// Loads over those of elastic buckling at the peak, from which that is what ends it.
 const BUCKLES: f64 = 0.5;
 
@@ -171,6 +177,8 @@ struct Watch<'a, 'm> {
     history_at_peak: Option<History>,
     /// What there is to see now.
     last: Vec<[Point; 8]>,
+    /// Of the last step.
+    iterations: usize,
     /// What broke first.
     broken: Option<(Mode, String)>,
 }
@@ -242,8 +250,11 @@ pub(crate) fn raise(
         if watch.peak + 1 == watch.curve.len() {
             at_peak = march.spent();
         }
-        let is_peak_enough = raised.to == Reach::Peak && !watch.waits();
-        let [share, least] = if is_peak_enough { PEAK_WORK } else { WORK };
+        let [share, least] = match raised.to {
+            Reach::Peak if !watch.waits() => PEAK_WORK,
+            Reach::Mode if !watch.waits() => MODE_WORK,
+            _ => WORK,
+        };
         march.limit(at_peak + (share * at_peak).max(least));
         if let Some(why) = watch.is_spent(length) {
             ended = why;
@@ -275,10 +286,16 @@ fn resultant(structure: &System, action: &Action, time: f64) -> Result<f64, Fail
     Ok(each.sum::<glam::DVec3>().length())
 }
 
-/// Share of the volume whose damage of compression past its peak `is` such.
-fn share_of_volume(structure: &System, points: &[[Point; 8]], is: impl Fn(f64) -> bool) -> f64 {
+/// Share of the volume of bricks that are `part` of it whose damage of compression past its peak `is`
+/// such.
+fn share_of_volume(
+    structure: &System,
+    points: &[[Point; 8]],
+    part: impl Fn(usize) -> bool,
+    is: impl Fn(f64) -> bool,
+) -> f64 {
     let (mut such, mut whole) = (0.0, 0.0);
-    for (hex, points) in points.iter().enumerate() {
+    for (hex, points) in points.iter().enumerate().filter(|(hex, _)| part(*hex)) {
         let volume = structure.model.mesh.hex_volume(hex as u32) / 8.0;
         for point in points {
             whole += volume;
@@ -329,6 +346,7 @@ impl<'a, 'm> Watch<'a, 'm> {
             at_peak: Vec::new(),
             history_at_peak: None,
             last: Vec::new(),
+            iterations: 0,
             broken: None,
         };
         watch.begin = watch.displacement(history);
@@ -370,9 +388,23 @@ impl<'a, 'm> Watch<'a, 'm> {
         self.yielding.is_none() && !self.structure.model.steel.is_empty() && is_whole()
     }
 
-    /// Share of the volume that was pressed beyond what its curve rises to, at the peak.
+    /// Share of the slab across the member that was pressed most beyond what its curve rises to, at
+    /// the peak.
     fn pressed(&self) -> f64 {
-        share_of_volume(self.structure, &self.at_peak, |past| past > 0.0)
+        let mesh = &self.structure.model.mesh;
+        let along = |hex: usize| mesh.centre(hex as u32).dot(self.prepared.direction);
+        let all = || 0..self.at_peak.len();
+        let [from, to] = all().fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], h| {
+            [a.min(along(h)), b.max(along(h))]
+        });
+        let slab = |hex: usize| {
+            let share = (along(hex) - from) / (to - from).max(1e-300);
+            ((SLABS as f64 * share) as usize).min(SLABS - 1)
+        };
+        let shares = (0..SLABS).map(|s| {
+            share_of_volume(self.structure, &self.at_peak, |h| slab(h) == s, |past| past > 0.0)
+        });
+        shares.fold(0.0, f64::max)
     }
 
     /// Whether its load has not risen for some steps: what falls when it cracks rises again where
@@ -386,6 +418,14 @@ impl<'a, 'm> Watch<'a, 'm> {
     fn see(&mut self, history: &History, step: &Step, points: &[[Point; 8]]) {
         let point = self.point(history, step.residual);
         self.curve.push(point);
+        self.iterations = step.iterations;
+        tracing::debug!(
+            "{:.3} of the loads: {} iterations, {} of the linear solver, avalanche {}",
+            point.load_factor,
+            step.iterations,
+            step.linear,
+            step.avalanche
+        );
         if point.load_factor > self.curve[self.peak].load_factor || self.at_peak.is_empty() {
             self.peak = self.curve.len() - 1;
             self.at_peak = points.to_vec();
@@ -422,6 +462,7 @@ impl<'a, 'm> Watch<'a, 'm> {
         let waits = self.waits();
         let (spent, ductile) = match self.raised.to {
             Reach::Peak => (if waits { SPENT } else { PASSED }, DUCTILE[1]),
+            Reach::Mode => (SPENT, DUCTILE[1]),
             Reach::Failure => (SPENT, DUCTILE[0]),
         };
         let is_far = moved > BEYOND * peak.displacement_m.abs();
@@ -456,8 +497,11 @@ impl<'a, 'm> Watch<'a, 'm> {
             *stiffness = Some(slope);
         }
         let first = *stiffness.get_or_insert(slope);
-        let grows = is_early || slope > SOFT * first;
-        let next = if grows { GROWTH * step } else { step.min(SHORT * moved) };
+        // Near a peak steps are short, so that it is seen; where bars yield nothing is left to see.
+        let is_easy = self.iterations <= EASY;
+        let grows = is_early || slope > SOFT * first || (is_easy && self.yielding.is_some());
+        let longer = if grows || is_easy { GROWTH * step } else { step };
+        let next = if grows { longer } else { longer.min(SHORT * moved) };
         let most = match self.raised.along {
             Along::Displacement(Some(to)) => (to - moved).max(0.0),
             _ => f64::INFINITY,
@@ -558,7 +602,7 @@ impl<'a, 'm> Watch<'a, 'm> {
         if spent > PRESSED {
             return Ok((
                 Mode::Crushing,
-                format!("{:.0} % of its concrete is pressed as hard as it can be", 100.0 * spent),
+                format!("{:.0} % of a section is pressed as hard as it can be", 100.0 * spent),
             ));
         }
         if has_failed && self.slipped() {
@@ -589,7 +633,7 @@ impl<'a, 'm> Watch<'a, 'm> {
 
     /// Share of the volume that is crushed at the end.
     fn crushed(&self) -> f64 {
-        share_of_volume(self.structure, &self.last, |past| past > CRUSHED)
+        share_of_volume(self.structure, &self.last, |_| true, |past| past > CRUSHED)
     }
 
     /// Whether a free end of a bar has slipped beyond what bond bears most at.

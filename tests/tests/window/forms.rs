@@ -175,7 +175,7 @@ impl Window {
                 return;
             }
             self.frame();
-            std::thread::sleep(std::time::Duration::from_millis(1));
+            super::rest();
         }
         panic!("{text} was not said");
     }

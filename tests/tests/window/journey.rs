@@ -46,7 +46,7 @@ impl Journey {
                 self.parts.push((part, count, longest, cpu));
                 return;
             }
-            std::thread::sleep(Duration::from_millis(1));
+            super::rest();
         }
         panic!("{part} did not happen");
     }

@@ -24,7 +24,17 @@ const PAIRS: [(usize, usize, usize); 3] = [(0, 1, 2), (1, 2, 0), (2, 0, 1)];
 /// # Errors
 /// [`ElementError::Inverted`].
 pub(crate) fn rows(nodes: &[DVec3; 8], natural: DVec3) -> Result<[[f64; 24]; 6], ElementError> {
-    rows_in(nodes, natural, 0, &axes(nodes)).map(|(rows, _)| rows)
+    let axes = axes(nodes);
+    let middles = [0, 1, 2].map(|across| {
+        let mut middle = DVec3::ZERO;
+        middle[across] = natural[across];
+        middle
+    });
+    let slopes = |natural: DVec3| along(nodes, natural, 0, &axes);
+    let [a, b, c] = middles;
+    let middles = [&slopes(a)?.0, &slopes(b)?.0, &slopes(c)?.0];
+    let local = rows_of(&slopes(natural)?.0, middles, &axes);
+    Ok(in_the_world(&local, &axes))
 }
 
 /// Stiffness and internal force. The law is that of [`super::hex8::integrate`].
@@ -37,11 +47,24 @@ pub(crate) fn integrate(
     mut law: impl FnMut(usize, &Voigt) -> (Voigt, Tangent),
 ) -> Result<Element<24>, ElementError> {
     let axes = axes(nodes);
+    // The brick's axes in the world's, and the other way round.
+    let own: Frame = axes.to_cols_array_2d();
+    let world = tensor::transposed(&own);
+    let is_turned = axes != DMat3::IDENTITY;
+    let middles = middles(nodes, &axes)?;
     let mut sum = Element::zero();
     for (point, natural) in GAUSS.into_iter().enumerate() {
-        let (rows, det) = rows_in(nodes, natural, point, &axes)?;
+        let (here, det) = along(nodes, natural, point, &axes)?;
+        let middles = [0, 1, 2].map(|k| &middles[k][usize::from(natural[k] > 0.0)]);
+        let rows = rows_of(&here, middles, &axes);
         let strain = rows.map(|row| row.iter().zip(u).map(|(r, u)| r * u).sum());
-        let (stress, tangent) = law(point, &strain);
+        // What the law says is turned, not the rows: it has fewer numbers.
+        let (stress, tangent) = if is_turned {
+            let (stress, tangent) = law(point, &tensor::rotate_strain(&strain, &world));
+            (tensor::rotate_stress(&stress, &own), tensor::rotate_tangent(&tangent, &world))
+        } else {
+            law(point, &strain)
+        };
         sum.add(&rows, &stress, &tangent, det);
     }
     sum.finite()
@@ -56,35 +79,51 @@ fn axes(nodes: &[DVec3; 8]) -> DMat3 {
     DMat3::from_cols(first, third.cross(first), third)
 }
 
-/// The rows, and the determinant of ∂x/∂ξ.
-fn rows_in(
+/// Gradients of the nodes' shape functions along the brick's axes.
+type Slopes = [[f64; 3]; 8];
+
+/// These at a natural coordinate, and the determinant of ∂x/∂ξ.
+fn along(
     nodes: &[DVec3; 8],
     natural: DVec3,
     point: usize,
     axes: &DMat3,
-) -> Result<([[f64; 24]; 6], f64), ElementError> {
-    // Gradients along the brick's axes.
-    let along = |natural: DVec3| {
-        let (all, det) = gradients(nodes, natural, point)?;
-        Ok((all.map(|g| (axes.transpose() * g).to_array()), det))
-    };
-    let (here, det) = along(natural)?;
-    let mut local = [[0.0; 24]; 6];
+) -> Result<(Slopes, f64), ElementError> {
+    let (all, det) = gradients(nodes, natural, point)?;
+    let back = axes.transpose();
+    Ok((all.map(|g| (back * g).to_array()), det))
+}
+
+/// These in the middle of the planes across each natural axis in which points lie.
+fn middles(nodes: &[DVec3; 8], axes: &DMat3) -> Result<[[Slopes; 2]; 3], ElementError> {
+    let mut all = [[[[0.0; 3]; 8]; 2]; 3];
+    for (across, two) in all.iter_mut().enumerate() {
+        for (slopes, natural) in two.iter_mut().zip([GAUSS[0], GAUSS[6]]) {
+            let mut middle = DVec3::ZERO;
+            middle[across] = natural[across];
+            *slopes = along(nodes, middle, 0, axes)?.0;
+        }
+    }
+    Ok(all)
+}
+
+/// Strains along the brick's axes as rows over displacements along the world's: of the slopes
+/// here, and, by the axis across which that is, in the middle.
+fn rows_of(here: &Slopes, middles: [&Slopes; 3], axes: &DMat3) -> [[f64; 24]; 6] {
+    let mut rows = [[0.0; 24]; 6];
     let mut put = |row: usize, node: usize, along: DVec3, by: f64| {
-        (0..3).for_each(|c| local[row][3 * node + c] += by * along[c]);
+        (0..3).for_each(|c| rows[row][3 * node + c] += by * along[c]);
     };
     for (node, slopes) in here.iter().enumerate() {
         (0..3).for_each(|i| put(i, node, axes.col(i), slopes[i]));
     }
     for (row, (i, j, across)) in (3..).zip(PAIRS) {
-        let mut middle = DVec3::ZERO;
-        middle[across] = natural[across];
-        for (node, slopes) in along(middle)?.0.iter().enumerate() {
+        for (node, slopes) in middles[across].iter().enumerate() {
             put(row, node, axes.col(i), slopes[j]);
             put(row, node, axes.col(j), slopes[i]);
         }
     }
-    Ok((in_the_world(&local, axes), det))
+    rows
 }
 
 /// Strains along the brick's axes as strains along the world's.

@@ -95,6 +95,8 @@ pub enum Reach {
     /// Until the member has failed, which tells how.
     #[default]
     Failure,
+    /// Until it is clear how it fails; where bars yield first it is not asked how far they stretch.
+    Mode,
     /// No farther than its peak needs to be known.
     Peak,
 }

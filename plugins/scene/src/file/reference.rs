@@ -409,7 +409,8 @@ fn told(node: &Value) -> String {
 
 /// The unit of a field: what its name ends in, or what its description gives after a comma.
 fn unit(field: &str, what: &str) -> &'static str {
-    const ENDINGS: [(&str, &str); 39] = [
+    const ENDINGS: [(&str, &str); 40] = [
+        ("_1e6_k", "1e-6/K"),
         ("_kn_m3", "kN/m³"),
         ("_kj_kg", "kJ/kg"),
         ("_ua_cm2", "µA/cm²"),

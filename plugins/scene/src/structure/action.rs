@@ -253,7 +253,7 @@ pub enum Action {
     },
     /// The steel pipe of a tunnel is warmer than its concrete.
     PipeTemperature {
-        /// K.
+        /// Than its concrete, K.
         warmer_k: f32,
     },
     /// Warmer than when built.
