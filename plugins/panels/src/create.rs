@@ -135,7 +135,9 @@ pub(crate) fn dialog(InMut(ui): InMut<Ui>, mut creation: ResMut<Creation>, mut j
     let height = (size.y - AROUND).max(80.0);
     ui.horizontal_top(|ui| {
         let left = (0.42 * size.x).min(340.0);
-        ui.allocate_ui(vec2(left, height), |ui| {
+        // Not as the row lies: groups of fields would stand beside each other.
+        let down = egui::Layout::top_down(egui::Align::Min);
+        ui.allocate_ui_with_layout(vec2(left, height), down, |ui| {
             ui.set_width(left);
             let area = ScrollArea::vertical().max_height(height).min_scrolled_height(height);
             area.auto_shrink(false).show(ui, |ui| creation.values.show(ui));

@@ -56,7 +56,7 @@ pub(crate) fn start(
 }
 
 fn open_row(ui: &mut Ui, path: &mut String, dialog_is_open: bool, actions: &mut Actions) {
-    ui.horizontal(|ui| {
+    ui.horizontal_wrapped(|ui| {
         let button =
             Button::new(RichText::new("Open…").size(16.0)).min_size(egui::vec2(110.0, 34.0));
         if ui.add_enabled(!dialog_is_open, button).on_hover_text("Ctrl+O").clicked() {
