@@ -240,7 +240,12 @@ fn sweep(folder: &Path) {
     {
         // Without a lock it is just being begun, or was killed then.
         let _ = fs::remove_dir(entry.path());
-        let is_dead = File::open(entry.path().join(LOCK)).is_ok_and(|lock| lock.try_lock().is_ok());
+        // Whoever begins makes the lock before all else: what has files and no lock was killed while
+        // it was being removed.
+        let is_dead = match File::open(entry.path().join(LOCK)) {
+            Ok(lock) => lock.try_lock().is_ok(),
+            Err(why) => why.kind() == io::ErrorKind::NotFound,
+        };
         if is_dead {
             let _ = fs::remove_dir_all(entry.path());
         }
@@ -322,6 +327,9 @@ mod tests {
         killed.lock = None;
         std::mem::forget(killed);
         fs::create_dir(folder.path().join(format!("{NAMELESS}at-its-beginning"))).unwrap();
+        let at_its_end = folder.path().join(format!("{NAMELESS}at-its-end"));
+        fs::create_dir(&at_its_end).unwrap();
+        fs::write(at_its_end.join(".withdrawn"), "{}").unwrap();
         let mut next = Set::begin(folder.path()).unwrap();
         assert_eq!(names(folder.path()).len(), 2);
         write(&mut next, "next");
