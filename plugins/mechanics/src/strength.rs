@@ -286,23 +286,16 @@ fn resultant(structure: &System, action: &Action, time: f64) -> Result<f64, Fail
     Ok(each.sum::<glam::DVec3>().length())
 }
 
-/// Share of the volume of bricks that are `part` of it whose damage of compression past its peak `is`
-/// such.
-fn share_of_volume(
+/// Of a brick's volume what its damage of compression past the peak `is` such, and all of it, m³.
+fn volumes(
     structure: &System,
-    points: &[[Point; 8]],
-    part: impl Fn(usize) -> bool,
+    hex: usize,
+    points: &[Point; 8],
     is: impl Fn(f64) -> bool,
-) -> f64 {
-    let (mut such, mut whole) = (0.0, 0.0);
-    for (hex, points) in points.iter().enumerate().filter(|(hex, _)| part(*hex)) {
-        let volume = structure.model.mesh.hex_volume(hex as u32) / 8.0;
-        for point in points {
-            whole += volume;
-            such += if is(past_peak([0.0, point.damage[1]])) { volume } else { 0.0 };
-        }
-    }
-    such / f64::max(whole, 1e-300)
+) -> [f64; 2] {
+    let volume = structure.model.mesh.hex_volume(hex as u32);
+    let such = points.iter().filter(|point| is(past_peak([0.0, point.damage[1]]))).count();
+    [volume * such as f64 / 8.0, volume]
 }
 
 fn nodes(structure: &System) -> f64 {
@@ -393,18 +386,17 @@ impl<'a, 'm> Watch<'a, 'm> {
     fn pressed(&self) -> f64 {
         let mesh = &self.structure.model.mesh;
         let along = |hex: usize| mesh.centre(hex as u32).dot(self.prepared.direction);
-        let all = || 0..self.at_peak.len();
-        let [from, to] = all().fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], h| {
-            [a.min(along(h)), b.max(along(h))]
-        });
-        let slab = |hex: usize| {
-            let share = (along(hex) - from) / (to - from).max(1e-300);
-            ((SLABS as f64 * share) as usize).min(SLABS - 1)
-        };
-        let shares = (0..SLABS).map(|s| {
-            share_of_volume(self.structure, &self.at_peak, |h| slab(h) == s, |past| past > 0.0)
-        });
-        shares.fold(0.0, f64::max)
+        let places: Vec<f64> = (0..self.at_peak.len()).map(along).collect();
+        let from = places.iter().copied().fold(f64::INFINITY, f64::min);
+        let to = places.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let mut sums = [[0.0; 2]; SLABS];
+        for (hex, points) in self.at_peak.iter().enumerate() {
+            let share = (places[hex] - from) / (to - from).max(1e-300);
+            let slab = &mut sums[((SLABS as f64 * share) as usize).min(SLABS - 1)];
+            let [such, whole] = volumes(self.structure, hex, points, |past| past > 0.0);
+            *slab = [slab[0] + such, slab[1] + whole];
+        }
+        sums.into_iter().map(|[such, whole]| such / whole.max(1e-300)).fold(0.0, f64::max)
     }
 
     /// Whether its load has not risen for some steps: what falls when it cracks rises again where
@@ -633,7 +625,11 @@ impl<'a, 'm> Watch<'a, 'm> {
 
     /// Share of the volume that is crushed at the end.
     fn crushed(&self) -> f64 {
-        share_of_volume(self.structure, &self.last, |_| true, |past| past > CRUSHED)
+        let bricks = self.last.iter().enumerate();
+        let [such, whole] = bricks
+            .map(|(hex, points)| volumes(self.structure, hex, points, |past| past > CRUSHED))
+            .fold([0.0, 0.0], |sum, one| [sum[0] + one[0], sum[1] + one[1]]);
+        such / f64::max(whole, 1e-300)
     }
 
     /// Whether a free end of a bar has slipped beyond what bond bears most at.

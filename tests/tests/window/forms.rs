@@ -70,17 +70,10 @@ fn a_member_is_changed_in_its_sheet_and_changed_back() {
     type_into(&mut window, "concrete class", "C35/45");
     assert!(has(&window, "2 values changed"));
     window.click("Apply");
-    // So small a column is predicted anew within a frame or two.
-    let mut was_outdated = false;
-    for _ in 0..super::PATIENCE {
-        window.frame();
-        was_outdated |= has(&window, "⚠ Outdated");
-        if was_outdated && window.with(|w| is(w, 0.5)) {
-            break;
-        }
-    }
+    let was_outdated = window.outdated_until("the wider column", |w| {
+        is(w, 0.5) && w.resource::<Latest>().result.is_some()
+    });
     assert!(was_outdated, "old numbers stand there as if nothing had happened");
-    window.until("the wider column", |w| is(w, 0.5));
     let written = fs::read_to_string(&file).expect("the scene");
     let expected = LONELY.replace("width_m: 0.4", "width_m: 0.5").replace("C30/37", "C35/45");
     assert_eq!(written, expected);

@@ -102,6 +102,21 @@ impl Window {
         panic!("{what} did not happen");
     }
 
+    /// Frames until `done`; whether numbers were marked as outdated on the way, which may be for a
+    /// single frame.
+    fn outdated_until(&mut self, what: &str, mut done: impl FnMut(&mut World) -> bool) -> bool {
+        let mut was_outdated = false;
+        for _ in 0..PATIENCE {
+            self.frame();
+            was_outdated |= self.harness.query_by_label("⚠ Outdated").is_some();
+            if done(self.app.borrow_mut().world_mut()) {
+                return was_outdated;
+            }
+            rest();
+        }
+        panic!("{what} did not happen");
+    }
+
     /// Frames until a widget of this name is there.
     fn until_seen(&mut self, label: &str) {
         for _ in 0..PATIENCE {
@@ -473,16 +488,9 @@ fn a_finding_is_noted_in_the_form_and_taken_back() {
     type_into(&mut window, "Date", "2026-05-03");
     window.click("Attach");
     let observed = |w: &mut World| w.resource::<CurrentScene>().0.structure.observations.len();
-    let mut was_outdated = false;
-    window.until("the evidence", |w| observed(w) == 1);
-    for _ in 0..PATIENCE {
-        was_outdated |= window.harness.query_by_label("⚠ Outdated").is_some();
-        if window.with(|w| w.resource::<Latest>().result.is_some()) {
-            break;
-        }
-        window.frame();
-        rest();
-    }
+    let was_outdated = window.outdated_until("the prediction with it", |w| {
+        observed(w) == 1 && w.resource::<Latest>().result.is_some()
+    });
     assert!(was_outdated, "old numbers stood there as if nothing had happened");
     window.frames(2);
     assert!(window.harness.query_by_label("⚠ Outdated").is_none());

@@ -25,15 +25,9 @@ const PAIRS: [(usize, usize, usize); 3] = [(0, 1, 2), (1, 2, 0), (2, 0, 1)];
 /// [`ElementError::Inverted`].
 pub(crate) fn rows(nodes: &[DVec3; 8], natural: DVec3) -> Result<[[f64; 24]; 6], ElementError> {
     let axes = axes(nodes);
-    let middles = [0, 1, 2].map(|across| {
-        let mut middle = DVec3::ZERO;
-        middle[across] = natural[across];
-        middle
-    });
-    let slopes = |natural: DVec3| along(nodes, natural, 0, &axes);
-    let [a, b, c] = middles;
-    let middles = [&slopes(a)?.0, &slopes(b)?.0, &slopes(c)?.0];
-    let local = rows_of(&slopes(natural)?.0, middles, &axes);
+    let slopes = |natural: DVec3| along(nodes, natural, 0, &axes).map(|(slopes, _)| slopes);
+    let [a, b, c] = [0, 1, 2].map(|across| slopes(middle(natural, across)));
+    let local = rows_of(&slopes(natural)?, [&a?, &b?, &c?], &axes);
     Ok(in_the_world(&local, &axes))
 }
 
@@ -94,14 +88,18 @@ fn along(
     Ok((all.map(|g| (back * g).to_array()), det))
 }
 
-/// These in the middle of the planes across each natural axis in which points lie.
+/// The middle of the plane across a natural axis in which a point lies.
+fn middle(natural: DVec3, across: usize) -> DVec3 {
+    DVec3::AXES[across] * natural[across]
+}
+
+/// These in the middles of the planes in which the Gauss points lie: by the axis across them, and
+/// below or above zero.
 fn middles(nodes: &[DVec3; 8], axes: &DMat3) -> Result<[[Slopes; 2]; 3], ElementError> {
     let mut all = [[[[0.0; 3]; 8]; 2]; 3];
     for (across, two) in all.iter_mut().enumerate() {
         for (slopes, natural) in two.iter_mut().zip([GAUSS[0], GAUSS[6]]) {
-            let mut middle = DVec3::ZERO;
-            middle[across] = natural[across];
-            *slopes = along(nodes, middle, 0, axes)?.0;
+            *slopes = along(nodes, middle(natural, across), 0, axes)?.0;
         }
     }
     Ok(all)

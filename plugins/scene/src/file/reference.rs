@@ -544,6 +544,7 @@ mod tests {
             ("height_m", "m"),
             ("cover_mm", "mm"),
             ("force_kn_m", "kN/m"),
+            ("expansion_1e6_k", "1e-6/K"),
             ("pressure_kpa", "kPa"),
             ("fov_deg", "°"),
         ] {
