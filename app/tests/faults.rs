@@ -130,8 +130,9 @@ fn names_may_be_of_any_script() {
         assert_eq!(measured["meters"][1]["name"], name);
         // Seconds each: those that are most unlike a file's name.
         if ["🌉", "../../x", &long].contains(&name) {
-            let one = ["--along", "0.3", "--slices", "1", "--out", text(&out("scan"))];
-            assert_eq!(files(&json(&[&["scan", &path], &one[..]].concat())).len(), 7);
+            let out = out("scan");
+            let scan = ["scan", &path, "--along", "0.3", "--slices", "1", "--out", text(&out)];
+            assert_eq!(files(&json(&scan)).len(), 7);
         }
         assert!(files(&json(&["analyze", &path, "--out", text(&out("analyze"))])).len() > 3);
         let predicted = json(&[
