@@ -47,7 +47,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             .collect();
         let focal = photograph.taken.focal(photograph.size);
         let lens = Lens::default();
-        let prior = Prior { size: photograph.size, focal, lens, k1_error: 0.03, picking_px: 2.0 };
+        let prior = Prior { size: photograph.size, focal, lens, k1_error: 0.05, picking_px: 2.0 };
         let picked = locate(&picks, &prior, &|pose| site.admits(pose, &picks))?;
         let better = by_edges(picked.clone(), &photograph, &site, &picks);
         let said = [&picked, &better].map(|located| wrong(located, &truth).unwrap_or_default());

@@ -38,7 +38,8 @@ pub fn bundled() -> &'static [(&'static str, &'static str)] {
         "slit",
         "door",
         "corridor",
-        "maze"
+        "maze",
+        "weathered"
     )
 }
 

@@ -64,6 +64,22 @@ pub struct ByEdges {
     pub kept: Option<&'static str>,
 }
 
+impl ByEdges {
+    /// The same in one sentence.
+    #[must_use]
+    pub fn line(&self) -> String {
+        let Self { seen, answered, off_px, moved_px, kept } = self;
+        match kept {
+            None => format!(
+                "{answered} of {seen} edges of the model that are in sight place it better: it moved by {moved_px:.1} px, and they are off by {off_px:.1} px"
+            ),
+            Some(why) => format!(
+                "placed by the picks alone, since {why} ({answered} of {seen} in sight)"
+            ),
+        }
+    }
+}
+
 /// Why a photograph is not placed. One sentence each.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum PoseError {
