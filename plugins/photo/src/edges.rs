@@ -15,10 +15,10 @@ use crate::{
     pose::{ByEdges, Covariance, UNKNOWNS, inverse},
 };
 
-/// Points of an edge lie so far apart, pixels.
-const SPACING: f64 = 4.0;
-/// Fewest points of an edge that can answer: some 50 pixels.
-const FEWEST_POINTS: usize = 12;
+/// Points of an edge lie so far apart, and light is averaged over as much along it, pixels.
+const SPACING: f64 = 12.0;
+/// Fewest points of an edge that can answer.
+const FEWEST_POINTS: usize = 6;
 /// Light is read so densely across an edge, pixels.
 const DENSE: f64 = 0.5;
 /// Steps are found by the slope of a Gaussian of this deviation, pixels.
@@ -213,8 +213,13 @@ fn answer(pose: &Pose, photograph: &Photograph, points: &[Point], reach: f64) ->
     let half = 0.5 * along(points.last()?);
     let steps: Vec<(f64, Vec<Step>)> = points
         .iter()
-        .map(|point| (along(point) - half, steps(photograph, point, reach.max(AROUND[0]))))
+        .filter_map(|point| {
+            Some((along(point) - half, steps(photograph, point, reach.max(AROUND[0]))?))
+        })
         .collect();
+    if steps.len() < FEWEST_POINTS {
+        return None;
+    }
     let (line, window) = best_line(&steps, half.abs(), reach)?;
     let fit = fitted(&steps, fitted(&steps, line, window)?.line, 1.0)?;
     let slope = |u: f64| {
@@ -229,24 +234,24 @@ fn answer(pose: &Pose, photograph: &Photograph, points: &[Point], reach: f64) ->
     })
 }
 
-/// Steps of light across an edge: where the slope of light, smoothed, is steepest.
-fn steps(photograph: &Photograph, point: &Point, reach: f64) -> Vec<Step> {
+/// Steps of light across an edge: where the slope of light, smoothed, is steepest. `None` at the
+/// picture's rim.
+fn steps(photograph: &Photograph, point: &Point, reach: f64) -> Option<Vec<Step>> {
     let margin = 3.0 * SMOOTH;
     let count = ((reach + margin) / DENSE).ceil() as i32;
     let [nx, ny] = point.across;
     let light = |k: i32| -> Option<Vec3> {
         let across = f64::from(k) * DENSE;
         let mut sum = Vec3::ZERO;
-        for along in [-1.5, -0.5, 0.5, 1.5] {
+        for k in 0..SPACING as u32 {
+            let along = f64::from(k) + 0.5 - 0.5 * SPACING;
             let at =
                 [point.at[0] + across * nx + along * ny, point.at[1] + across * ny - along * nx];
             sum += photograph.light_at(at)?;
         }
-        Some(0.25 * sum)
+        Some(sum / SPACING as f32)
     };
-    let Some(light): Option<Vec<Vec3>> = (-count..=count).map(light).collect() else {
-        return Vec::new();
-    };
+    let light: Vec<Vec3> = (-count..=count).map(light).collect::<Option<_>>()?;
     let wing = (margin / DENSE) as usize;
     let kernel = |m: i32| {
         let x = f64::from(m) * DENSE / SMOOTH;
@@ -266,7 +271,7 @@ fn steps(photograph: &Photograph, point: &Point, reach: f64) -> Vec<Step> {
         let top = 0.5 * (a - c) / (a - 2.0 * b + c);
         (b > a && b >= c).then(|| ((first + 1.0 + i as f64 + top) * DENSE, b / most))
     };
-    slopes.windows(3).enumerate().filter_map(step).collect()
+    Some(slopes.windows(3).enumerate().filter_map(step).collect())
 }
 
 /// Share of an edge's steps that a line collects, those nearer than `window` pixels.
@@ -325,7 +330,7 @@ fn fitted(steps: &[(f64, Vec<Step>)], (middle, slope): Line, window: f64) -> Opt
         ((best.0 - at).abs() < window).then_some([*u, best.0])
     };
     let near: Vec<[f64; 2]> = steps.iter().filter_map(near).collect();
-    if near.len() < FEWEST_POINTS / 2 {
+    if 2 * near.len() < FEWEST_POINTS {
         return None;
     }
     let count = near.len() as f64;

@@ -73,9 +73,9 @@ impl ByEdges {
             None => format!(
                 "{answered} of {seen} edges of the model that are in sight place it better: it moved by {moved_px:.1} px, and they are off by {off_px:.1} px"
             ),
-            Some(why) => format!(
-                "placed by the picks alone, since {why} ({answered} of {seen} in sight)"
-            ),
+            Some(why) => {
+                format!("placed by the picks alone, since {why} ({answered} of {seen} in sight)")
+            }
         }
     }
 }
