@@ -170,10 +170,10 @@ impl Builder<'_> {
             base_colour: m.colour,
             base_texture,
             emission: m.emission,
-            finish: m.finish.as_ref().map(|f| {
-                let finish = crate::Finish::new(f.kind, Key::new(f.seed, 0), f.worn);
-                Arc::new(finish.stained(f.rust, f.efflorescence))
-            }),
+            finish: m
+                .finish
+                .as_ref()
+                .map(|f| Arc::new(crate::Finish::new(f.kind, Key::new(f.seed, 0), f.worn))),
             ..crate::Material::default()
         });
         Ok(())

@@ -59,12 +59,6 @@ pub struct Finish {
     /// 0: as struck; 1: dirty, stained, written upon.
     #[serde(default = "some")]
     pub worn: f32,
-    /// Whether rust runs down it.
-    #[serde(default)]
-    pub rust: bool,
-    /// Whether efflorescence has come out of it.
-    #[serde(default)]
-    pub efflorescence: bool,
 }
 
 /// The families of BRDF.
