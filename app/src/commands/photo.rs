@@ -7,7 +7,7 @@ use std::{collections::BTreeSet, path::Path};
 
 use glam::DVec3;
 use intrados_photo::{
-    FaceMap, Located, Photograph, Pick, PoseError, Prior, Site, locate,
+    FaceMap, Located, Photograph, Pick, PoseError, Prior, Site, by_edges, locate,
     overlay::Overlay,
     picks::{self, PickedIn},
     picture::srgb,
@@ -329,7 +329,8 @@ impl Work<'_> {
             k1_error: K1_ERROR,
             picking_px: self.args.picking_px,
         };
-        locate(picks, &prior, &|pose| self.site.admits(pose, picks))
+        let picked = locate(picks, &prior, &|pose| self.site.admits(pose, picks))?;
+        Ok(by_edges(picked, photograph, &self.site, picks))
     }
 
     fn facts(&self, photo: &str) -> Facts {
@@ -396,6 +397,7 @@ impl Report {
                 pose.rms_px,
                 pose.picks.len(),
             );
+            pose.edges.iter().for_each(|edges| text += &format!("{}\n", edges.line));
             text += &output::table(&rows(&photo.faces));
             photo.relit.iter().for_each(|relit| text += &relit::lines(relit));
             text += &read::lines(&photo.read);

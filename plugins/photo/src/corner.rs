@@ -8,6 +8,8 @@ use crate::face::{Chart, Surface, normal};
 
 /// Cosine between normals on two sides of an edge: sharper than 30°.
 const SHARP: f64 = 0.866;
+/// Cosine between pieces that run on in one line: less than half a degree.
+const STRAIGHT: f64 = 0.999_96;
 /// Volume that three unit normals of a corner span.
 const SOLID: f64 = 0.2;
 /// Vertices nearer than this share of the member's size are one.
@@ -30,21 +32,13 @@ impl Surface {
         let (places, triangles) = self.welded();
         let normals: Vec<DVec3> = self.triangles.iter().map(normal).collect();
         let mut at_vertex: Vec<Vec<DVec3>> = vec![Vec::new(); places.len()];
-        let mut at_edge: HashMap<[usize; 2], Vec<DVec3>> = HashMap::new();
         for (corners, normal) in triangles.iter().zip(&normals) {
-            if *normal == DVec3::ZERO {
-                continue;
-            }
-            for k in 0..3 {
-                let [a, b] = [corners[k], corners[(k + 1) % 3]];
-                at_vertex[a].push(*normal);
-                at_edge.entry([a.min(b), a.max(b)]).or_default().push(*normal);
-            }
+            corners
+                .iter()
+                .filter(|_| *normal != DVec3::ZERO)
+                .for_each(|&i| at_vertex[i].push(*normal));
         }
-        let is_sharp = |normals: &Vec<DVec3>| match normals[..] {
-            [a, b] => a.dot(b) < SHARP,
-            _ => true,
-        };
+        let at_edge = at_edges(&triangles, &normals);
         let mut edges: Vec<[usize; 2]> =
             at_edge.iter().filter(|(_, normals)| is_sharp(normals)).map(|(e, _)| *e).collect();
         edges.sort_unstable();
@@ -56,6 +50,25 @@ impl Surface {
             }
         };
         Outline { corners, edges: edges.into_iter().map(|e| e.map(|i| places[i])).collect() }
+    }
+
+    /// Edges that somebody at `eye` may see as lines, m: sharp ones with a side that looks at him,
+    /// and those where the surface turns away from him, be it sharp or round. Pieces that run on in
+    /// one line are one edge.
+    pub(crate) fn lines_from(&self, eye: DVec3) -> Vec<[DVec3; 2]> {
+        let (places, triangles) = self.welded();
+        let normals: Vec<DVec3> = self.triangles.iter().map(normal).collect();
+        let mut edges: Vec<[usize; 2]> = at_edges(&triangles, &normals)
+            .into_iter()
+            .filter(|(edge, normals)| {
+                let looks = |normal: &&DVec3| normal.dot(eye - places[edge[0]]) > 0.0;
+                let looking = normals.iter().filter(looks).count();
+                looking > 0 && (looking < normals.len() || is_sharp(normals))
+            })
+            .map(|(edge, _)| edge)
+            .collect();
+        edges.sort_unstable();
+        joined(&edges, &places)
     }
 
     /// Vertices, those at one place taken together, and triangles of these.
@@ -83,6 +96,59 @@ impl Surface {
         corners.sort_by_key(key);
         corners
     }
+}
+
+/// Normals of the triangles at each edge.
+fn at_edges(triangles: &[[usize; 3]], normals: &[DVec3]) -> HashMap<[usize; 2], Vec<DVec3>> {
+    let mut at_edge: HashMap<[usize; 2], Vec<DVec3>> = HashMap::new();
+    for (corners, normal) in triangles.iter().zip(normals).filter(|(_, n)| **n != DVec3::ZERO) {
+        for k in 0..3 {
+            let [a, b] = [corners[k], corners[(k + 1) % 3]];
+            at_edge.entry([a.min(b), a.max(b)]).or_default().push(*normal);
+        }
+    }
+    at_edge
+}
+
+/// Whether a surface with these normals on both sides of an edge is sharp there, or ends.
+fn is_sharp(normals: &[DVec3]) -> bool {
+    match normals {
+        [a, b] => a.dot(*b) < SHARP,
+        _ => true,
+    }
+}
+
+/// Edges made of pieces that run on in the direction of the first.
+fn joined(pieces: &[[usize; 2]], places: &[DVec3]) -> Vec<[DVec3; 2]> {
+    let mut at: HashMap<usize, Vec<usize>> = HashMap::new();
+    for (i, piece) in pieces.iter().enumerate() {
+        piece.iter().for_each(|&end| at.entry(end).or_default().push(i));
+    }
+    let mut is_taken = vec![false; pieces.len()];
+    let mut edges = Vec::new();
+    for (i, &[a, b]) in pieces.iter().enumerate() {
+        if std::mem::replace(&mut is_taken[i], true) {
+            continue;
+        }
+        let way = (places[b] - places[a]).normalize_or_zero();
+        let ends = [(a, -way), (b, way)].map(|(mut end, way)| {
+            let goes_on = |end: usize, j: usize| {
+                let other = pieces[j][usize::from(pieces[j][0] == end)];
+                let is_on = (places[other] - places[end]).normalize_or_zero().dot(way) > STRAIGHT;
+                is_on.then_some(other)
+            };
+            while let Some((j, other)) = at[&end]
+                .iter()
+                .filter(|&&j| !is_taken[j])
+                .find_map(|&j| Some((j, goes_on(end, j)?)))
+            {
+                (is_taken[j], end) = (true, other);
+            }
+            places[end]
+        });
+        edges.push(ends);
+    }
+    edges
 }
 
 /// Whether three of the planes that meet at a vertex meet there alone.

@@ -2,6 +2,7 @@
 
 pub mod closeup;
 pub mod corner;
+mod edges;
 pub mod face;
 pub mod map;
 pub mod marks;
@@ -17,7 +18,8 @@ mod similarity;
 pub mod site;
 pub mod taken;
 
+pub use edges::by_edges;
 pub use map::{FaceMap, unrolled};
 pub use picture::{Photograph, PictureError};
-pub use pose::{Located, Pick, Pose, PoseError, Prior, locate};
+pub use pose::{ByEdges, Located, Pick, Pose, PoseError, Prior, locate};
 pub use site::{Sight, Site};

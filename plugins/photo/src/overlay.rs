@@ -1,18 +1,11 @@
 //! A photograph with the model's edges and the picks drawn over it.
 
 use glam::{DVec3, Vec3};
-use intrados_scene::{Ray, tracer::Scratch};
 
 use crate::{Photograph, Pick, Pose, picture::srgb, site::Site};
 
 /// Longest side of the picture, pixels.
 const LONGEST: u32 = 2400;
-/// Edges are drawn piece by piece, so long in the picture, pixels.
-const PIECE: f64 = 4.0;
-/// Most pieces of one edge.
-const MOST_PIECES: f64 = 4096.0;
-/// An edge lies in its own surface: what is nearer by less than this share does not hide it.
-const NEAR: f64 = 2e-3;
 
 const EDGE: [u8; 3] = [0, 230, 255];
 const PICKED: [u8; 3] = [255, 60, 200];
@@ -41,7 +34,7 @@ impl Overlay {
         let mut overlay = Self::plain(photograph);
         let to_overlay = |[x, y]: [f64; 2]| [x / f64::from(shrink), y / f64::from(shrink)];
         let thickness = (f64::from(overlay.size[0]) / 900.0).clamp(0.7, 2.0);
-        for place in edges.iter().flat_map(|edge| seen(pose, edge, site, f64::from(shrink))) {
+        for place in edges.iter().flat_map(|edge| site.seen_along(pose, edge, f64::from(shrink))) {
             if let Some(at) = pose.project(place) {
                 overlay.dot(to_overlay(at), thickness, EDGE);
             }
@@ -99,26 +92,4 @@ impl Overlay {
 /// So many pixels of a photograph are one of its overlay.
 fn shrink(photograph: &Photograph) -> u32 {
     photograph.size[0].max(photograph.size[1]).div_ceil(LONGEST).max(1)
-}
-
-/// Points of an edge that the camera sees, so close that they make a line.
-fn seen(pose: &Pose, [a, b]: &[DVec3; 2], site: &Site, shrink: f64) -> Vec<DVec3> {
-    // What an edge is long in the picture, at its nearest.
-    let near = [a, b, &(0.5 * (*a + *b))].map(|p| p.distance(pose.position));
-    let near = near.into_iter().fold(f64::INFINITY, f64::min).max(0.05);
-    let length = pose.focal_px * a.distance(*b) / near;
-    let pieces = (4.0 * length / (PIECE * shrink)).ceil().clamp(2.0, MOST_PIECES) as u32;
-    let places: Vec<DVec3> = (0..=pieces)
-        .map(|k| a.lerp(*b, f64::from(k) / f64::from(pieces)))
-        .filter(|place| pose.project(*place).is_some_and(|at| pose.holds(at)))
-        .collect();
-    let rays: Vec<Ray> = places
-        .iter()
-        .map(|place| {
-            let to = (*place - pose.position).as_vec3();
-            Ray::new(pose.position.as_vec3(), to, (1.0 - NEAR) as f32)
-        })
-        .collect();
-    let clear = site.are_clear(&rays, &mut Scratch::default());
-    places.into_iter().zip(clear).filter_map(|(place, clear)| clear.then_some(place)).collect()
 }

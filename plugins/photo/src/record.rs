@@ -37,6 +37,8 @@ pub struct PoseRecord {
     pub reduced_chi2: f64,
     /// The picks.
     pub picks: Vec<PickRecord>,
+    /// What the model's edges made of what the picks say; `None` where they were not asked.
+    pub edges: Option<EdgesRecord>,
     /// Where else the camera may have stood, m.
     pub other_position_m: Option<[f64; 3]>,
 }
@@ -52,6 +54,23 @@ pub struct PickRecord {
     pub residual_px: [f64; 2],
     /// Whether it contradicts all others and does not count.
     pub left_out: bool,
+}
+
+/// What the model's edges in the photograph made of a picked pose.
+#[derive(Debug, Clone, Serialize)]
+pub struct EdgesRecord {
+    /// Straight edges of members that the camera sees at some length.
+    pub seen: usize,
+    /// How many of them the photograph shows where one pose draws them.
+    pub answered: usize,
+    /// Root mean square of what these are off in the end, pixels.
+    pub off_px: f64,
+    /// Root mean square of how far the picked places moved in the picture, pixels.
+    pub moved_px: f64,
+    /// Whether they improved the pose.
+    pub improved: bool,
+    /// The same in one sentence.
+    pub line: String,
 }
 
 /// A face of a member in a photograph, about the middle of what is seen of it.
@@ -112,6 +131,14 @@ impl PoseRecord {
             rms_px: located.rms_px,
             reduced_chi2: located.reduced_chi2,
             picks: picks.iter().zip(&located.residuals).enumerate().map(pick).collect(),
+            edges: located.edges.map(|edges| EdgesRecord {
+                seen: edges.seen,
+                answered: edges.answered,
+                off_px: edges.off_px,
+                moved_px: edges.moved_px,
+                improved: edges.kept.is_none(),
+                line: edges.line(),
+            }),
             other_position_m: located.other.map(|other| other.position.to_array()),
         }
     }

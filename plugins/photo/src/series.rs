@@ -157,6 +157,7 @@ impl PlacedSeries {
             reduced_chi2: 1.0,
             left_out: None,
             other: None,
+            edges: None,
         })
     }
 }

@@ -19,6 +19,10 @@ use crate::{
 /// A pick counts as seen while nothing lies between it and the camera up to this share of the
 /// distance: models and picks are no more exact.
 const NEAR: f64 = 0.01;
+/// An edge lies in its own surface: what is nearer by less than this share does not hide it.
+const BEFORE_EDGE: f64 = 2e-3;
+/// Most points of one edge.
+const MOST_POINTS: f64 = 16_384.0;
 /// Points of the grid along the picture's longer side, by which faces are looked for.
 const GRID: f64 = 128.0;
 /// Sine of the flattest view that shows anything: 10°.
@@ -164,6 +168,28 @@ impl Site {
         let mut blocked = vec![false; rays.len()];
         self.tracer.any(rays, &mut blocked, scratch);
         blocked.into_iter().map(|blocked| !blocked).collect()
+    }
+
+    /// Points of an edge that the camera sees, no farther apart in the picture than `step_px`.
+    pub(crate) fn seen_along(&self, pose: &Pose, [a, b]: &[DVec3; 2], step_px: f64) -> Vec<DVec3> {
+        // What an edge is long in the picture, at its nearest.
+        let near = [a, b, &(0.5 * (*a + *b))].map(|p| p.distance(pose.position));
+        let near = near.into_iter().fold(f64::INFINITY, f64::min).max(0.05);
+        let length = pose.focal_px * a.distance(*b) / near;
+        let pieces = (length / step_px).ceil().clamp(2.0, MOST_POINTS) as u32;
+        let places: Vec<DVec3> = (0..=pieces)
+            .map(|k| a.lerp(*b, f64::from(k) / f64::from(pieces)))
+            .filter(|place| pose.project(*place).is_some_and(|at| pose.holds(at)))
+            .collect();
+        let rays: Vec<Ray> = places
+            .iter()
+            .map(|place| {
+                let to = (*place - pose.position).as_vec3();
+                Ray::new(pose.position.as_vec3(), to, (1.0 - BEFORE_EDGE) as f32)
+            })
+            .collect();
+        let clear = self.are_clear(&rays, &mut Scratch::default());
+        places.into_iter().zip(clear).filter_map(|(place, clear)| clear.then_some(place)).collect()
     }
 
     /// What places in a picture show; `None` where that is no member.

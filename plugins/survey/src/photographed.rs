@@ -11,7 +11,7 @@
 use intrados_ct::{Picture, picture::CRACK};
 use intrados_damage::zone::{ZONES, zone_at};
 use intrados_photo::{
-    Located, Photograph, Pick, Prior, Site,
+    Located, Photograph, Pick, Prior, Site, by_edges,
     face::{Chart, Face, Surface},
     locate,
     map::{FaceMap, MapError},
@@ -99,7 +99,8 @@ pub fn placed(
     let site = Site::new(scene, job)?;
     let picks = picks(photo, scene, &site)?;
     let prior = prior(photo, &photograph);
-    let located = locate(&picks, &prior, &|pose| site.admits(pose, &picks)).map_err(because)?;
+    let picked = locate(&picks, &prior, &|pose| site.admits(pose, &picks)).map_err(because)?;
+    let located = by_edges(picked, &photograph, &site, &picks);
     Ok((photograph, site, located))
 }
 

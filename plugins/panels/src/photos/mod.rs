@@ -446,6 +446,9 @@ fn stand(ui: &mut Ui, shot: &Shot, actions: &mut Actions, viewpoint: &mut Viewpo
                     actions.ask(Action::Tab("Render"));
                 }
             });
+            if let Some(edges) = &located.edges {
+                ui.label(edges.line());
+            }
             if let Some(k) = located.left_out {
                 ui.label(format!("⚠ pick {} contradicts the others and is left out", k + 1));
             }

@@ -5,7 +5,7 @@ use std::{io::Write, path::PathBuf, sync::Arc};
 use egui::{Color32, ColorImage};
 use glam::DVec3;
 use intrados_photo::{
-    Located, Photograph, Pick, Site,
+    Located, Photograph, Pick, Site, by_edges,
     corner::Outline,
     face::Surface,
     locate,
@@ -121,8 +121,9 @@ pub(super) fn place(
 ) -> Result<Placed, String> {
     alone(|| {
         let prior = photographed::prior(photo, photograph);
-        let located = locate(picks, &prior, &|pose| site.admits(pose, picks));
-        let located = located.map_err(|why| why.to_string())?;
+        let picked = locate(picks, &prior, &|pose| site.admits(pose, picks));
+        let picked = picked.map_err(|why| why.to_string())?;
+        let located = by_edges(picked, photograph, site, picks);
         let overlay = Overlay::new(photograph, &located.pose, edges, &[], site);
         Ok(Placed { located, picture: image(overlay) })
     })

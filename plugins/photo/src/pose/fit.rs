@@ -112,8 +112,11 @@ pub(super) fn fit(start: Pose, picks: &[Pick], prior: &Prior, loss: Loss) -> Opt
 
 /// Inverse of a positive matrix whose unknowns have units of their own; `None` where it leaves a
 /// direction open.
-fn inverse(matrix: Covariance) -> Option<Covariance> {
+pub(crate) fn inverse(matrix: Covariance) -> Option<Covariance> {
     let scale: [f64; UNKNOWNS] = std::array::from_fn(|k| matrix[(k, k)].sqrt());
+    if !scale.iter().all(|s| *s > 0.0) {
+        return None;
+    }
     let even = Covariance::from_fn(|i, j| matrix[(i, j)] / (scale[i] * scale[j]));
     let is_closed = even.symmetric_eigenvalues().min() > 1e-13;
     if !is_closed {

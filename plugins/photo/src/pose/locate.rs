@@ -45,6 +45,39 @@ pub struct Located {
     /// Another pose that fits nearly as well: the picks lie in a plane seen from far away. Pick a
     /// point out of it.
     pub other: Option<Pose>,
+    /// What the model's edges in the photograph made of it, where they were asked.
+    pub edges: Option<ByEdges>,
+}
+
+/// What the model's edges made of a pose that was picked.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ByEdges {
+    /// Straight edges of members that the camera sees at some length.
+    pub seen: usize,
+    /// How many of them the photograph shows where one pose draws them.
+    pub answered: usize,
+    /// Root mean square of what these are off in the end, pixels.
+    pub off_px: f64,
+    /// Root mean square of how far the picked places moved in the picture, pixels.
+    pub moved_px: f64,
+    /// Why the picked pose was kept, in a few words; `None` where the edges improved it.
+    pub kept: Option<&'static str>,
+}
+
+impl ByEdges {
+    /// The same in one sentence.
+    #[must_use]
+    pub fn line(&self) -> String {
+        let Self { seen, answered, off_px, moved_px, kept } = self;
+        match kept {
+            None => format!(
+                "{answered} of {seen} edges of the model that are in sight place it better: it moved by {moved_px:.1} px, and they are off by {off_px:.1} px"
+            ),
+            Some(why) => {
+                format!("placed by the picks alone, since {why} ({answered} of {seen} in sight)")
+            }
+        }
+    }
 }
 
 /// Why a photograph is not placed. One sentence each.
@@ -276,6 +309,7 @@ fn told(
         reduced_chi2,
         left_out,
         other: other.map(|fit| fit.pose),
+        edges: None,
     })
 }
 

@@ -11,7 +11,8 @@ use glam::{DMat3, DVec3, Vec3};
 use intrados_scene::{Camera, Lens};
 use nalgebra::{Matrix2, SMatrix};
 
-pub use locate::{Located, PoseError, Prior, locate};
+pub(crate) use fit::inverse;
+pub use locate::{ByEdges, Located, PoseError, Prior, locate};
 
 /// What of a pose is unknown, in this order: a turn about the camera's right, down and forward axes
 /// (rad, after the rotation), its position (m), the logarithm of its focal length, k1.
