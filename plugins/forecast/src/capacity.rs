@@ -231,24 +231,24 @@ mod tests {
         BTreeMap::from([("M".to_owned(), losses)])
     }
 
-    /// Half of a beam with two bars of 12 mm bears M = A_s f_y z, z by the block of stresses that the
+    /// Half of a beam with four bars of 12 mm bears M = A_s f_y z, z by the block of stresses that the
     /// bars need, and a little more as they harden: a fifth of their section less is nearly a fifth
     /// less, and a twentieth more or less of that so much of its strength. What concrete has lost of
     /// its strength changes z alone.
     #[test]
     fn a_beam_loses_what_its_bars_lose() {
         let scene = loaded(
-            "Beam(section: Rectangle(width_m: 0.2, depth_m: 0.4), length_m: 1.1,
-                reinforcement: (cover_mm: 35, bars: [Row(side_deg: 180, count: 2, diameter_mm: 12)], stirrups: (diameter_mm: 8, spacing_mm: 100)))",
+            "Beam(section: Rectangle(width_m: 0.4, depth_m: 0.4), length_m: 1.1,
+                reinforcement: (cover_mm: 35, bars: [Row(side_deg: 180, count: 4, diameter_mm: 12)], stirrups: (diameter_mm: 8, spacing_mm: 100)))",
             "(member: \"M\", place: Surface(from: 0.0909, to: 0.0909, side_deg: 180), hold: Directions(x: false, y: true, z: true)),
              (member: \"M\", place: End, hold: Directions(x: true, y: false, z: false))",
-            "action: Force(place: Surface(from: 0.9, to: 1, side_deg: 0), force_kn: (0, -10, 0))",
+            "action: Force(place: Surface(from: 0.9, to: 1, side_deg: 0), force_kn: (0, -20, 0))",
         );
         let losses = lost(0.1, Estimate { value: 0.2, std_error: 0.05 });
         let found = capacity(&scene, "M", None, &losses, &Job::default()).unwrap().unwrap();
         let by_hand = |steel: f64, concrete: f64| {
-            let force = steel * 226.2e-6 * 500e6;
-            force * (0.351 - 0.5 * force / (concrete * 38e6 * 0.2)) / 0.95 / 10e3
+            let force = steel * 452.4e-6 * 500e6;
+            force * (0.351 - 0.5 * force / (concrete * 38e6 * 0.4)) / 0.95 / 20e3
         };
         let cost = 1.0 - by_hand(0.8, 0.9) / by_hand(1.0, 1.0);
         assert!((found.cost.value - cost).abs() < 0.03, "{cost} {found:?}");
