@@ -172,7 +172,10 @@ impl Builder<'_> {
             emission: m.emission,
             finish: m.finish.as_ref().map(|f| {
                 let finish = crate::Finish::new(f.kind, Key::new(f.seed, 0), f.worn);
-                Arc::new(finish.stained(f.rust, f.efflorescence))
+                let stained = f.stains.iter().fold(finish, |finish, s| {
+                    finish.stained_at(s.kind, Vec2::from(s.at), s.width_m, s.length_m)
+                });
+                Arc::new(stained)
             }),
             ..crate::Material::default()
         });
