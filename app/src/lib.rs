@@ -36,6 +36,9 @@ mod session;
 
 use std::{process::ExitCode, sync::Arc};
 
+// Not used here: for one build of `parquet`, with the window and without; see `stage`.
+use ahash as _;
+
 use bevy_app::App;
 use clap::Parser;
 use intrados_ct::detect::{self, Method};

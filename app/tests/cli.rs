@@ -664,7 +664,7 @@ mod interrupted {
 
     /// A pier with planted damage and drawn slices; nothing holds it, so that it has no life to be
     /// computed.
-    fn pier(folder: &Path) -> PathBuf {
+    pub(super) fn pier(folder: &Path, slices: u32, pixels: u32) -> PathBuf {
         let scene = r#"(
             schema: "intrados.scene/1",
             title: "A pier",
@@ -681,10 +681,14 @@ mod interrupted {
                 at: (0, 0, 0),
                 concrete: "C30/37",
                 material: "grey",
-                slices: [Drawn(name: "core", count: 12, size: 512, pixel_mm: 0.9, seed: 1)],
+                slices: [Drawn(name: "core", count: COUNT, size: SIZE, pixel_mm: STEP, seed: 1)],
                 truth: [Voids(from: 0, to: 1, porosity: 0.02, median_mm: 3)],
             )],
         )"#;
+        let scene = scene
+            .replace("COUNT", &slices.to_string())
+            .replace("SIZE", &pixels.to_string())
+            .replace("STEP", &(460.0 / f64::from(pixels)).to_string());
         let path = folder.join("pier.ron");
         fs::write(&path, scene).unwrap();
         path
@@ -693,7 +697,7 @@ mod interrupted {
     #[test]
     fn a_prediction_goes_on_from_its_slices() {
         let folder = tempfile::tempdir().unwrap();
-        let scene = pier(folder.path());
+        let scene = pier(folder.path(), 5, 384);
         let files = ["members.csv", "zones.csv", "slices.csv", "pores.csv", "evidence.csv"];
         goes_on(&["predict", text(&scene), "--spp", "1"], 2, "predict.json", &files);
     }
@@ -711,7 +715,7 @@ mod interrupted {
     #[test]
     fn calibration_goes_on_from_its_plantings() {
         let folder = tempfile::tempdir().unwrap();
-        let scene = pier(folder.path());
+        let scene = pier(folder.path(), 2, 256);
         goes_on(
             &["experiment", "calibration", "--scenes", text(&scene), "--plantings", "2"],
             2,
@@ -835,7 +839,9 @@ fn shards_of_readings_make_the_whole() {
 #[test]
 fn predict_writes_its_report() {
     let folder = tempfile::tempdir().unwrap();
-    let report = json(&["predict", "column", "--spp", "1", "--out", text(folder.path())]);
+    let scene = interrupted::pier(folder.path(), 2, 256);
+    let out = folder.path().join("out");
+    let report = json(&["predict", text(&scene), "--spp", "1", "--out", text(&out)]);
     assert_eq!(report["schema"], "intrados.predict/2");
     let members = report["members"].as_array().unwrap();
     assert!(!members.is_empty());

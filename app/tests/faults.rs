@@ -128,10 +128,12 @@ fn names_may_be_of_any_script() {
         );
         let measured = json(&["measure", &path, "--spp", "1", "--out", text(&out("measure"))]);
         assert_eq!(measured["meters"][1]["name"], name);
-        assert_eq!(
-            files(&json(&["scan", &path, "--slices", "1", "--out", text(&out("scan"))])).len(),
-            13
-        );
+        // Seconds each: those that are most unlike a file's name.
+        if ["🌉", "../../x", &long].contains(&name) {
+            let out = out("scan");
+            let scan = ["scan", &path, "--along", "0.3", "--slices", "1", "--out", text(&out)];
+            assert_eq!(files(&json(&scan)).len(), 7);
+        }
         assert!(files(&json(&["analyze", &path, "--out", text(&out("analyze"))])).len() > 3);
         let predicted = json(&[
             "predict",
@@ -169,10 +171,10 @@ fn ids_that_look_alike_have_files_of_their_own() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scene.ron");
     fs::write(&path, scene("alike", &["P_1", "P/1", "p_1"])).unwrap();
-    // Of a place a stack, four files of a slice and a table, and one list; of a life a series, a
+    // Of its place a stack, four files of a slice and a table, and one list; of a life a series, a
     // table and at least one step.
     for (command, more, least) in
-        [("scan", &["--slices", "1"][..], 3 * 2 * 6 + 1), ("analyze", &[], 3 * 3 + 2)]
+        [("scan", &["--along", "0.3", "--slices", "1"][..], 3 * 6 + 1), ("analyze", &[], 3 * 3 + 2)]
     {
         let out = folder.path().join(command);
         let mut named =
@@ -286,21 +288,8 @@ fn a_broken_off_scan_goes_on() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scene.ron");
     fs::write(&path, scene("fine", &["P1"])).unwrap();
-    let places = [
-        "--along",
-        "0.3",
-        "--along",
-        "0.4",
-        "--along",
-        "0.5",
-        "--along",
-        "0.6",
-        "--slices",
-        "1",
-        "--threads",
-        "1",
-    ];
-    let slice = "P1_0.600_slice-001.tif";
+    let places = ["--along", "0.3", "--along", "0.4", "--slices", "1", "--threads", "1"];
+    let slice = "P1_0.400_slice-001.tif";
     let whole = folder.path().join("whole");
     json(&[&["scan", text(&path), "--out", text(&whole)], &places[..]].concat());
     for signal in ["-INT", "-KILL"] {

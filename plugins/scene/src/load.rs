@@ -38,8 +38,7 @@ pub fn bundled() -> &'static [(&'static str, &'static str)] {
         "slit",
         "door",
         "corridor",
-        "maze",
-        "weathered"
+        "maze"
     )
 }
 

@@ -24,5 +24,6 @@ pub use stages::{Stage, StagePlugin};
 // program does; asked for alike everywhere, they and all that rests on them are built once.
 use bytemuck as _;
 use getrandom as _;
+use hashbrown as _;
 use regex_syntax as _;
 use smallvec as _;

@@ -511,9 +511,8 @@ fn a_finding_is_noted_in_the_form_and_taken_back() {
 /// A table of the prediction is saved alone, and says what the report's says.
 #[test]
 fn a_table_is_saved_alone() {
-    let mut window = with_column();
+    let (mut window, folder) = with_lonely();
     window.until("the prediction", |w| w.resource::<Latest>().result.is_some());
-    let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("members.csv");
     window.ask(Action::Save(Taken::Table("members")));
     window.frames(3);

@@ -12,7 +12,7 @@ use serde_json::Value;
 use super::{
     close::close,
     course, grade,
-    kind::{By, Verdict, kind},
+    kind::{By, Verdict, kind, lies_on_ground},
     model::material,
     ring::{Piece, joined},
     shape::{Tube, boxed, tube},
@@ -67,6 +67,8 @@ pub(super) struct Found {
     pub(super) frame: Frame,
     pub(super) across: [f64; 2],
     pub(super) is_round: bool,
+    /// Whether its class or name says that it lies on the ground over its length.
+    pub(super) lies_on_ground: bool,
     pub(super) volume: f64,
     pub(super) tube: Option<Tube>,
     /// Of a lining that closes a ring: the names of its segments.
@@ -279,6 +281,7 @@ impl Builder {
             frame,
             across,
             is_round,
+            lies_on_ground: kind == MemberKind::Slab && lies_on_ground(element),
             volume,
             tube: tube.filter(|_| kind == MemberKind::Lining),
             segments,

@@ -1,4 +1,4 @@
-//! Which members stand on the ground: footings and tunnels do; columns and walls do where nothing
+//! Which members stand on the ground: footings and tunnels do, and slabs that are called so; columns and walls do where nothing
 //! reaches up to their foot; what lies does where it is the lowest of all. The others are carried.
 
 use glam::Vec3;
@@ -20,6 +20,8 @@ pub(super) struct Standing {
     pub(super) is_level: bool,
     /// Whether it is a tunnel.
     pub(super) is_tube: bool,
+    /// Whether it is called what lies on the ground.
+    pub(super) is_grounded: bool,
 }
 
 /// For each member, whether it stands on the ground.
@@ -29,7 +31,7 @@ pub(super) fn on_ground(members: &[Standing]) -> Vec<bool> {
     members
         .iter()
         .map(|m| match m.kind {
-            _ if m.is_tube => true,
+            _ if m.is_tube || m.is_grounded => true,
             MemberKind::Footing => true,
             _ if m.is_level => m.bounds[0].y < lowest + LOWEST && !carried(m),
             _ => !carried(m),
@@ -51,7 +53,13 @@ mod tests {
     use super::*;
 
     fn standing(kind: MemberKind, from: [f32; 3], to: [f32; 3], is_level: bool) -> Standing {
-        Standing { kind, bounds: [from.into(), to.into()], is_level, is_tube: false }
+        Standing {
+            kind,
+            bounds: [from.into(), to.into()],
+            is_level,
+            is_tube: false,
+            is_grounded: false,
+        }
     }
 
     /// A footing and a column on it, a column on the bare slope beside, a beam over both, a slab on
@@ -68,6 +76,9 @@ mod tests {
             standing(Slab, [10.0, -0.5, -2.0], [15.0, -0.3, 2.0], true),
         ];
         assert_eq!(on_ground(&members), [true, false, true, false, false, true]);
+        // An approach slab lies on the fill, though it ends on a beam.
+        let approach = Standing { is_grounded: true, ..members[4] };
+        assert!(on_ground(&[&members[..4], &[approach]].concat())[4]);
         // Without its footing the first column stands on the ground.
         assert!(on_ground(&members[1..])[0]);
     }

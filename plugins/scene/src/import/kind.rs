@@ -230,6 +230,17 @@ pub(super) fn kind(element: &Element, solid: Option<&Box3>, tube: Option<&Tube>)
     }
 }
 
+/// Whether it lies on the ground over its length, by its class, predefined type or name: slabs on
+/// fill behind an abutment and on the soil under a house, pavements.
+pub(super) fn lies_on_ground(element: &Element) -> bool {
+    const NAMES: [&str; 6] =
+        ["approach", "schleppplatte", "bodenplatte", "sohlplatte", "baseslab", "groundslab"];
+    let mut own = std::iter::once(&element.name).chain(&element.words).flat_map(|n| words(n));
+    element.class == "IfcPavement"
+        || matches!(element.predefined.as_str(), "BASESLAB" | "APPROACH_SLAB" | "TRACKSLAB")
+        || own.any(|word| NAMES.iter().any(|name| word.starts_with(name)))
+}
+
 fn by_properties(element: &Element) -> Option<MemberKind> {
     let found = SETS.iter().find(|(set, _)| element.properties.contains_key(*set));
     found.map(|(_, kind)| *kind).filter(|kind| *kind != MemberKind::Other)
@@ -314,6 +325,14 @@ mod tests {
 
     fn told(element: &Element) -> Verdict {
         kind(element, None, None)
+    }
+
+    #[test]
+    fn some_slabs_lie_on_the_ground() {
+        let slab = |name| named("IfcSlab", name);
+        assert!(lies_on_ground(&slab("Bridge road - Approach slab #2")));
+        assert!(lies_on_ground(&Element { predefined: "BASESLAB".into(), ..slab("level 0") }));
+        assert!(!lies_on_ground(&slab("bridge deck")));
     }
 
     #[test]

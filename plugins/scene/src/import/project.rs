@@ -417,6 +417,7 @@ fn standing(built: &Built) -> Vec<Standing> {
         bounds: bounds(&found.id),
         is_level: is_level(found),
         is_tube: found.tube.is_some(),
+        is_grounded: found.lies_on_ground,
     };
     built.found.iter().map(one).collect()
 }
@@ -443,7 +444,7 @@ fn supports(members: &[Detail], on_ground: &[bool]) -> String {
             for end in ["Start", "End"] {
                 hold(end, &how);
             }
-        } else if found.kind == MemberKind::Footing {
+        } else if found.kind == MemberKind::Footing || (level && *on_ground) {
             hold("Bottom", "Springs(stiffness_mpa_m: (20, 50, 20), lifts: true)");
         } else if level {
             hold("Surface(from: 0, to: 0.1, side_deg: 180)", "Fixed");
@@ -697,7 +698,7 @@ fn rules(
 - **Age** of {}: {YEARS} years.\n\
 - **Reinforcement** of {}: the least that EN 1992-1-1 allows, {STEEL}: beams §9.2.1.1 and §9.2.2, slabs and footings §9.3.1.1, columns §9.5.2 and §9.5.3, walls and linings §9.6, piles §9.8.5; cover of table 4.4N (structural class S4) and Δc_dev = 10 mm. Bars are straight, and slant as their member tapers; where they would not lie in it, as in an arch, none are assumed, and Remarks say so. Real members have more: their bars are what to look for first.\n\
 - **Steel grade** of {} bars: {STEEL}.\n\
-- **Supports**: the ground holds footings (springs of 50 MPa/m), tunnels (springs of 40 MPa/m), columns and walls that nothing reaches up to, and the lowest slabs. Every other member is held for itself, `alone`, what stands at its foot, what lies under both ends; the whole (`analyze --whole`) leaves those supports out. **Loads**: {}.\n",
+- **Supports**: the ground holds footings and slabs that lie on it (springs of 50 MPa/m; approach and base slabs by predefined type or name, and the lowest slabs), tunnels (springs of 40 MPa/m), columns and walls that nothing reaches up to. Every other member is held for itself, `alone`, what stands at its foot, what lies under both ends; the whole (`analyze --whole`) leaves those supports out. **Loads**: {}.\n",
         imported.concrete_assumed,
         count(Assumed::Exposure),
         count(Assumed::Age),
