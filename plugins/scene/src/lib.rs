@@ -23,7 +23,7 @@ pub mod tracer;
 
 pub use crack::{CrackSurface, Mouth, Spalled, SurfaceDamage, SurfaceFile};
 pub use file::reference;
-pub use finish::{Finish, FinishKind};
+pub use finish::{Finish, FinishKind, StainKind};
 pub use lamp::{Lamp, LampKind};
 pub use lens::Lens;
 pub use load::{Card, ErrorKind, LoadError, bundled, cards, validate};

@@ -512,6 +512,13 @@ impl Checker<'_> {
         }
         if let Some(finish) = &m.finish {
             self.within("finish.worn", finish.worn, 0.0, 1.0);
+            self.each("finish.stains", &finish.stains, |c, stain| {
+                let Stain { kind: _, at, width_m, length_m } = stain;
+                c.within("at", at.0, -1e5, 1e5);
+                c.within("at", at.1, -1e5, 1e5);
+                c.within("width_m", *width_m, 1e-3, 10.0);
+                c.within("length_m", *length_m, 1e-3, 100.0);
+            });
         }
         match m.surface {
             Surface::Lambert | Surface::Black => {}

@@ -170,10 +170,13 @@ impl Builder<'_> {
             base_colour: m.colour,
             base_texture,
             emission: m.emission,
-            finish: m
-                .finish
-                .as_ref()
-                .map(|f| Arc::new(crate::Finish::new(f.kind, Key::new(f.seed, 0), f.worn))),
+            finish: m.finish.as_ref().map(|f| {
+                let finish = crate::Finish::new(f.kind, Key::new(f.seed, 0), f.worn);
+                let stained = f.stains.iter().fold(finish, |finish, s| {
+                    finish.stained_at(s.kind, Vec2::from(s.at), s.width_m, s.length_m)
+                });
+                Arc::new(stained)
+            }),
             ..crate::Material::default()
         });
         Ok(())

@@ -4,7 +4,7 @@ use glam::{EulerRot, Mat4, Quat, Vec3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{FinishKind, Lens};
+use crate::{FinishKind, Lens, StainKind};
 
 fn one() -> Vec3 {
     Vec3::ONE
@@ -59,6 +59,24 @@ pub struct Finish {
     /// 0: as struck; 1: dirty, stained, written upon.
     #[serde(default = "some")]
     pub worn: f32,
+    /// What ran down it from where.
+    #[serde(default)]
+    pub stains: Vec<Stain>,
+}
+
+/// Rust or lime that came out of a face and ran down it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Stain {
+    /// What it is.
+    pub kind: StainKind,
+    /// Where it begins, across the face and up: of an upright face that looks along +z these are x
+    /// and y of the world, of one that looks along +x they are −z and y.
+    pub at: (f32, f32),
+    /// At its widest.
+    pub width_m: f32,
+    /// At its longest.
+    pub length_m: f32,
 }
 
 /// The families of BRDF.

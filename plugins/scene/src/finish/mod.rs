@@ -55,6 +55,15 @@ impl FinishKind {
     ];
 }
 
+/// What comes out of concrete and runs down its face.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub enum StainKind {
+    /// From steel that corrodes.
+    Rust,
+    /// Lime that water washed out.
+    Efflorescence,
+}
+
 /// How a member's face looks, everywhere.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Finish {
@@ -164,6 +173,38 @@ mod tests {
             let ratio = far.element_sum() / near.element_sum();
             assert!((0.92..1.08).contains(&ratio), "{kind:?}: {near} {far}");
             assert!(flat < 0.5 * bent, "{kind:?}: {flat} {bent}");
+        }
+    }
+
+    /// A stain covers the face where it begins, and nothing above, beside or beyond it.
+    #[test]
+    fn a_stain_runs_down_from_its_place() {
+        let plain = Finish::new(FinishKind::Board, Key::new(6, 0), 0.0);
+        let from = vec2(0.3, 1.5);
+        for kind in [StainKind::Rust, StainKind::Efflorescence] {
+            let stained = plain.clone().stained_at(kind, from, 0.2, 0.6);
+            let cover = |at: Vec2| {
+                let seen = stained.at(at, 1e-3, Vec3::splat(0.4));
+                let [is_rust, is_lime] = [seen.rust, seen.efflorescence].map(|share| share > 0.0);
+                assert!(!is_rust || kind == StainKind::Rust);
+                assert!(!is_lime || kind == StainKind::Efflorescence);
+                seen.rust + seen.efflorescence
+            };
+            let mean = |low: Vec2, high: Vec2| {
+                let at = |i| low + Vec2::from(Key::new(7, i).pair(0)) * (high - low);
+                (0..4000).map(|i| cover(at(i))).sum::<f32>() / 4000.0
+            };
+            let begin = mean(from + vec2(-0.05, -0.1), from + vec2(0.05, -0.03));
+            let end = mean(from + vec2(-0.05, -0.58), from + vec2(0.05, -0.5));
+            assert!(begin > 0.3 && end < 0.5 * begin, "{kind:?}: {begin} {end}");
+            for (low, high) in [
+                (vec2(-1.0, 0.1), vec2(1.0, 1.0)),
+                (vec2(-1.0, -2.0), vec2(1.0, -0.61)),
+                (vec2(0.16, -2.0), vec2(1.0, 1.0)),
+                (vec2(-1.0, -2.0), vec2(-0.16, 1.0)),
+            ] {
+                assert!(mean(from + low, from + high) == 0.0, "{kind:?}: {low} {high}");
+            }
         }
     }
 

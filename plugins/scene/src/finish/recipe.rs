@@ -4,9 +4,9 @@ use glam::{Vec2, Vec3, vec2};
 use intrados_stage::random::{Draw, Key};
 
 use super::{
-    Finish, FinishKind,
+    Finish, FinishKind, StainKind,
     relief::{Boards, Holes, Joints, Pores, Relief, Rough, Stones},
-    tone::{Band, Base, Cover, Lifts, Mark, Matter, Patches, Repairs, Runs, Strokes},
+    tone::{Band, Base, Cover, Lifts, Mark, Matter, Patches, Repairs, Runs, Strokes, Trail},
 };
 
 impl Finish {
@@ -49,6 +49,24 @@ impl Finish {
                 0.5,
             ));
         }
+        self
+    }
+
+    /// The same with a stain that begins at a place of the face and runs down from it, at most so
+    /// wide and long, m.
+    #[must_use]
+    pub fn stained_at(mut self, kind: StainKind, from: Vec2, width: f32, length: f32) -> Self {
+        let cover = match kind {
+            // Where it stands in the open rust is brown, and darker than on the steel itself.
+            StainKind::Rust => Cover {
+                matter: Matter::Rust,
+                colour: Vec3::new(0.24, 0.115, 0.045),
+                replaces: true,
+                strength: 0.75,
+            },
+            StainKind::Efflorescence => salt(),
+        };
+        self.marks.push(Mark::Trail(Trail { cover, from, width, length }));
         self
     }
 }

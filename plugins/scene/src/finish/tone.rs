@@ -23,6 +23,7 @@ pub(super) struct Base {
 pub(super) enum Mark {
     Patches(Patches),
     Runs(Runs),
+    Trail(Trail),
     Lifts(Lifts),
     Repairs(Repairs),
     Strokes(Strokes),
@@ -74,6 +75,18 @@ pub(super) struct Runs {
     pub(super) length: f32,
     /// Share of places that have one.
     pub(super) share: f32,
+}
+
+/// What came out of the face along a line across it and ran down from there.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Trail {
+    pub(super) cover: Cover,
+    /// Middle of where it begins, m.
+    pub(super) from: Vec2,
+    /// m.
+    pub(super) width: f32,
+    /// Longest, m.
+    pub(super) length: f32,
 }
 
 /// Borders between pours.
@@ -173,7 +186,10 @@ impl Base {
 impl Mark {
     /// Whether it is rust or efflorescence.
     pub(super) fn is_stain(&self) -> bool {
-        let (Self::Patches(Patches { cover, .. }) | Self::Runs(Runs { cover, .. })) = self else {
+        let (Self::Patches(Patches { cover, .. })
+        | Self::Runs(Runs { cover, .. })
+        | Self::Trail(Trail { cover, .. })) = self
+        else {
             return false;
         };
         cover.matter != Matter::Dirt
@@ -183,6 +199,7 @@ impl Mark {
         match self {
             Self::Patches(patches) => patches.lay(key, at, footprint, seen),
             Self::Runs(runs) => runs.lay(key, at, footprint, seen),
+            Self::Trail(trail) => trail.lay(key, at, footprint, seen),
             Self::Lifts(lifts) => lifts.lay(key, at, footprint, seen),
             Self::Repairs(repairs) => repairs.lay(key, at, seen),
             Self::Strokes(strokes) => strokes.lay(key, at, footprint, seen),
@@ -243,6 +260,29 @@ impl Runs {
             let share = step(1.5, 0.3, off) * (1.0 - fall) * step(-0.02, 0.01, fall);
             seen.cover(&self.cover, share * streaks.clamp(0.0, 1.0));
         }
+    }
+}
+
+impl Trail {
+    fn lay(&self, key: Key, at: Vec2, footprint: f32, seen: &mut Seen) {
+        let key = own(key, 97, self.cover.colour, self.from.x + self.width);
+        let fall = (self.from.y - at.y) / self.length;
+        if visible(self.width, footprint) <= 0.0 || !(-0.1..1.0).contains(&fall) {
+            return;
+        }
+        let drift = 0.15 * self.width * smooth(key, vec2(at.y / (3.0 * self.width), 0.5));
+        let off = (at.x - self.from.x - drift).abs() / (0.5 * self.width);
+        // It runs down in tongues, each as far as its water took it, the outer ones less far.
+        let tongue = smooth(key, vec2(at.x / (0.14 * self.width), at.y / (2.5 * self.length)));
+        let reach = (1.0 - 0.7 * off * off) * (0.65 + 0.35 * tongue);
+        if off > 1.2 || reach <= 0.0 {
+            return;
+        }
+        let cloud = smooth(key, vec2(at.x / (0.3 * self.width), at.y / (0.5 * self.width) + 9.5));
+        let fine = smooth(key, vec2(at.x / 0.008, at.y / 0.05 + 5.5));
+        let begin = step(-0.06, 0.03, fall + 0.03 * cloud);
+        let share = begin * step(reach, 0.1 * reach, fall) * step(1.2, 0.4, off);
+        seen.cover(&self.cover, share * (0.8 + 0.3 * cloud + 0.25 * fine).clamp(0.0, 1.0));
     }
 }
 
