@@ -1,5 +1,6 @@
-//! Which members stand on the ground: footings and tunnels do, and slabs that are called so; columns and walls do where nothing
-//! reaches up to their foot; what lies does where it is the lowest of all. The others are carried.
+//! Which members stand on the ground: footings and tunnels do, and slabs that are called so; columns
+//! and walls do where nothing reaches up to their foot; what lies does where it is the lowest of all.
+//! The others are carried.
 
 use glam::Vec3;
 
