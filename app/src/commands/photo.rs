@@ -7,7 +7,7 @@ use std::{collections::BTreeSet, path::Path};
 
 use glam::DVec3;
 use intrados_photo::{
-    FaceMap, Located, Photograph, Pick, PoseError, Prior, Site, by_edges, locate,
+    FaceMap, Located, Photograph, Pick, PoseError, Prior, Site,
     overlay::Overlay,
     picks::{self, PickedIn},
     picture::srgb,
@@ -329,8 +329,7 @@ impl Work<'_> {
             k1_error: K1_ERROR,
             picking_px: self.args.picking_px,
         };
-        let picked = locate(picks, &prior, &|pose| self.site.admits(pose, picks))?;
-        Ok(by_edges(picked, photograph, &self.site, picks))
+        self.site.locate(photograph, picks, &prior)
     }
 
     fn facts(&self, photo: &str) -> Facts {

@@ -92,7 +92,6 @@ pub fn by_edges(located: Located, photograph: &Photograph, site: &Site, picks: &
         let Some(balance) = balance(&known, &gone, &answers) else { break };
         (by.answered, by.off_px) = (balance.answered, balance.off_px);
         if balance.answered < FEWEST_EDGES {
-            by.kept = Some("too few edges of the model are to be seen as clear lines");
             break;
         }
         if balance.misfit > WORST {
@@ -110,22 +109,14 @@ pub fn by_edges(located: Located, photograph: &Photograph, site: &Site, picks: &
             break;
         }
     }
-    if by.answered < FEWEST_EDGES && by.kept.is_none() {
+    if by.answered < FEWEST_EDGES {
         by.kept = Some("too few edges of the model are to be seen as clear lines");
     }
     if by.kept.is_some() {
         return Located { edges: Some(by), ..located };
     }
     by.moved_px = moved(&located.pose, &pose, picks);
-    let residual = |pick: &Pick| {
-        let at = pose.project(pick.place);
-        at.map_or([f64::NAN; 2], |[x, y]| [x - pick.pixel[0], y - pick.pixel[1]])
-    };
-    let residuals: Vec<[f64; 2]> = picks.iter().map(residual).collect();
-    let counts = residuals.iter().enumerate().filter(|(i, _)| located.left_out != Some(*i));
-    let (sum, count) = counts.fold((0.0, 0.0), |(s, n), (_, [x, y])| (s + x * x + y * y, n + 1.0));
-    let rms_px = (sum / f64::max(count, 1.0)).sqrt();
-    Located { pose, covariance, residuals, rms_px, edges: Some(by), ..located }
+    Located { covariance, edges: Some(by), ..located.with(pose, picks) }
 }
 
 /// Straight edges of the members that the camera sees.

@@ -137,6 +137,11 @@ fn held(name: &str, scene: &Scene, after: u64, plant: Plant, says: &[(&str, Says
             let add = [f64::from(u8::from(z.abs() <= 1.96)), z, z * z, std_error];
             sums.iter_mut().zip(add).for_each(|(s, a)| *s += a);
         }
+        // What a run that is cut off has found until then.
+        if (number - after).is_multiple_of(20) {
+            let held: Vec<f64> = sums.iter().map(|sums| sums[0]).collect();
+            println!("{name}: {held:?} held of {}", number - after);
+        }
     }
     let means = sums.into_iter().map(|sums| sums.map(|s| s / PLANTINGS as f64));
     let tell = |([share, z, square, error], (what, _)): ([f64; 4], &(&str, Says))| {

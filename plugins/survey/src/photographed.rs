@@ -11,9 +11,8 @@
 use intrados_ct::{Picture, picture::CRACK};
 use intrados_damage::zone::{ZONES, zone_at};
 use intrados_photo::{
-    Located, Photograph, Pick, Prior, Site, by_edges,
+    Located, Photograph, Pick, Prior, Site,
     face::{Chart, Face, Surface},
-    locate,
     map::{FaceMap, MapError},
     picture::srgb,
     reading::{Defect, FaceReading, ReadFace, read_all},
@@ -99,8 +98,7 @@ pub fn placed(
     let site = Site::new(scene, job)?;
     let picks = picks(photo, scene, &site)?;
     let prior = prior(photo, &photograph);
-    let picked = locate(&picks, &prior, &|pose| site.admits(pose, &picks)).map_err(because)?;
-    let located = by_edges(picked, &photograph, &site, &picks);
+    let located = site.locate(&photograph, &picks, &prior).map_err(because)?;
     Ok((photograph, site, located))
 }
 

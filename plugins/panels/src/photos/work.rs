@@ -5,10 +5,9 @@ use std::{io::Write, path::PathBuf, sync::Arc};
 use egui::{Color32, ColorImage};
 use glam::DVec3;
 use intrados_photo::{
-    Located, Photograph, Pick, Site, by_edges,
+    Located, Photograph, Pick, Site,
     corner::Outline,
     face::Surface,
-    locate,
     map::FaceMap,
     overlay::Overlay,
     picture::srgb,
@@ -121,9 +120,7 @@ pub(super) fn place(
 ) -> Result<Placed, String> {
     alone(|| {
         let prior = photographed::prior(photo, photograph);
-        let picked = locate(picks, &prior, &|pose| site.admits(pose, picks));
-        let picked = picked.map_err(|why| why.to_string())?;
-        let located = by_edges(picked, photograph, site, picks);
+        let located = site.locate(photograph, picks, &prior).map_err(|why| why.to_string())?;
         let overlay = Overlay::new(photograph, &located.pose, edges, &[], site);
         Ok(Placed { located, picture: image(overlay) })
     })

@@ -296,21 +296,17 @@ fn told(
     let Some(covariance) = covariance.filter(|_| error_m < OPEN * distance_m) else {
         return Err(PoseError::Open { error_m, distance_m });
     };
-    let off = |pick: &Pick| {
-        fit.pose
-            .project(pick.place)
-            .map_or([f64::NAN; 2], |[x, y]| [x - pick.pixel[0], y - pick.pixel[1]])
-    };
-    Ok(Located {
+    let located = Located {
         pose: fit.pose,
         covariance,
-        residuals: picks.iter().map(off).collect(),
+        residuals: Vec::new(),
         rms_px,
         reduced_chi2,
         left_out,
         other: other.map(|fit| fit.pose),
         edges: None,
-    })
+    };
+    Ok(located.with(fit.pose, picks))
 }
 
 /// Refuses what says nothing before anything is computed.
@@ -360,6 +356,19 @@ fn spread(mut points: DMatrix<f64>) -> f64 {
 }
 
 impl Located {
+    /// The same with another pose, and how far it draws the picks from where they are.
+    pub(crate) fn with(self, pose: Pose, picks: &[Pick]) -> Self {
+        let off = |pick: &Pick| {
+            let at = pose.project(pick.place);
+            at.map_or([f64::NAN; 2], |[x, y]| [x - pick.pixel[0], y - pick.pixel[1]])
+        };
+        let residuals: Vec<[f64; 2]> = picks.iter().map(off).collect();
+        let counts = residuals.iter().enumerate().filter(|(i, _)| self.left_out != Some(*i));
+        let (sum, count) =
+            counts.fold((0.0, 0.0), |(sum, n), (_, [x, y])| (sum + x * x + y * y, n + 1.0));
+        Self { pose, residuals, rms_px: (sum / f64::max(count, 1.0)).sqrt(), ..self }
+    }
+
     /// Covariance of where a place is drawn, pixels²: by the pose alone. `None` where it is not.
     #[must_use]
     pub(crate) fn pixel_covariance(&self, place: DVec3) -> Option<SMatrix<f64, 2, 2>> {
