@@ -9,7 +9,7 @@ use glam::DVec3;
 use intrados_photo::{
     FaceMap, Located, Photograph, Pick, PoseError, Prior, Site,
     overlay::Overlay,
-    picks::{self, PickedIn},
+    picks::{self, Picks},
     picture::srgb,
     record::{FaceRecord, PoseRecord},
     relight::RelitRecord,
@@ -100,7 +100,7 @@ struct Work<'a> {
     args: &'a args::Photo,
     scene: Scene,
     site: Site,
-    picks: Vec<PickedIn>,
+    picks: Picks,
     /// Of COLMAP, where there is one.
     series: Option<PlacedSeries>,
     /// Index of the one member that is unrolled.
@@ -125,11 +125,11 @@ pub(crate) fn run(session: &Session, args: &args::Photo) -> Result<Outcome, Fail
     }
     let picks = match &args.pose {
         Some(table) => picks::read(table, &scene, &site)?,
-        None => Vec::new(),
+        None => Picks::default(),
     };
     let member = args.member.as_ref().map(|word| index_of(&scene, word)).transpose()?;
     let series = match &args.series {
-        Some(folder) => Some(Series::read(folder)?.placed(&picks)?),
+        Some(folder) => Some(Series::read(folder)?.placed(&picks.picked)?),
         None => None,
     };
     let work = Work { session, args, scene, site, picks, series, member };
@@ -139,7 +139,7 @@ pub(crate) fn run(session: &Session, args: &args::Photo) -> Result<Outcome, Fail
         return Err(Failure::Usage(line));
     }
     let known = |photo: &String| names.contains(photo);
-    if let Some(other) = work.picks.iter().filter_map(|p| p.photo.as_ref()).find(|p| !known(p)) {
+    if let Some(other) = work.picks.photos().find(|p| !known(p)) {
         tracing::warn!("picks in {other:?} are not used: no such photograph is given");
     }
     let mut files = output::begin(&args.out)?;
@@ -237,7 +237,7 @@ impl Work<'_> {
         for note in &photograph.notes {
             tracing::info!("{name}: {note}");
         }
-        let picks = self.picks_in(name);
+        let picks = self.picks.of(name, self.args.files.len() == 1, &photograph);
         let located = self
             .locate(&photograph, name, &picks)
             .map_err(|error| Failure::BadInput(bad(&error)))?;
@@ -298,13 +298,6 @@ impl Work<'_> {
             not_relit,
             read,
         })
-    }
-
-    /// Picks of a photograph; those that name none belong to the only one.
-    fn picks_in(&self, name: &str) -> Vec<Pick> {
-        let is_only = self.args.files.len() == 1;
-        let is_of = |p: &&PickedIn| p.photo.as_ref().map_or(is_only, |photo| photo == name);
-        self.picks.iter().filter(is_of).map(|p| p.pick).collect()
     }
 
     fn locate(

@@ -282,35 +282,6 @@ pub fn cylindrical(point: [f64; 3], origin: [f64; 3], axis: [f64; 3]) -> Frame {
 /// An equivalent strain and its derivative by the strain.
 pub(crate) type Equivalent = (f64, Voigt);
 
-/// Mazars' equivalent strain √Σ⟨εᵢ⟩² (Mazars 1984).
-#[must_use]
-pub(crate) fn mazars(strain: &Voigt) -> Equivalent {
-    let mut p = Principal::of_strain(strain);
-    p.values = p.values.map(|e| e.max(0.0));
-    let value = p.values.iter().map(|e| e * e).sum::<f64>().sqrt();
-    match value > 0.0 {
-        // ∂εᵢ/∂ε is nᵢ⊗nᵢ, whose scalar product with engineering shear takes the components of a
-        // stress.
-        true => (value, scale(&p.as_stress(), 1.0 / value)),
-        false => (0.0, ZERO),
-    }
-}
-
-/// Rankine's equivalent strain: the largest principal stress of the undamaged material over its
-/// modulus; zero without tension.
-#[must_use]
-pub(crate) fn rankine(strain: &Voigt, nu: f64) -> Equivalent {
-    let elastic = stiffness(1.0, nu);
-    let p = Principal::of_stress(&apply(&elastic, strain));
-    match p.values[0] > 0.0 {
-        // ∂σ₁/∂σ is n⊗n, and C symmetric.
-        true => {
-            (p.values[0], apply(&elastic, &Principal { values: [1.0, 0.0, 0.0], ..p }.as_strain()))
-        }
-        false => (0.0, ZERO),
-    }
-}
-
 /// The least principal stress, without directions: the least root of the characteristic polynomial
 /// by the angle of its three real ones (Smith 1961); exact to the square root of rounding.
 #[must_use]
@@ -459,28 +430,25 @@ pub(crate) mod tests {
         let compression = scale(&tension, -1.0);
         assert!((modified_von_mises(&tension, k, nu).0 - e).abs() < 1e-18);
         assert!((modified_von_mises(&compression, k, nu).0 - e / k).abs() < 1e-18);
-        assert!((mazars(&tension).0 - e).abs() < 1e-18);
-        assert!((mazars(&compression).0 - e * nu * 2f64.sqrt()).abs() < 1e-18);
     }
 
     #[test]
     fn derivatives_of_equivalent_strains_are_those_of_finite_differences() {
         for walk in 0..200 {
             let e = random(walk, 1e-3);
-            for f in [mazars, |e: &Voigt| modified_von_mises(e, 12.0, 0.2)] {
-                let (_, derivative) = f(&e);
-                for c in 0..6 {
-                    let step = 1e-8;
-                    let (mut up, mut down) = (e, e);
-                    up[c] += step;
-                    down[c] -= step;
-                    let numeric = (f(&up).0 - f(&down).0) / (2.0 * step);
-                    assert!(
-                        (numeric - derivative[c]).abs() < 2e-4,
-                        "{walk} {c} {numeric} {}",
-                        derivative[c]
-                    );
-                }
+            let f = |e: &Voigt| modified_von_mises(e, 12.0, 0.2);
+            let (_, derivative) = f(&e);
+            for c in 0..6 {
+                let step = 1e-8;
+                let (mut up, mut down) = (e, e);
+                up[c] += step;
+                down[c] -= step;
+                let numeric = (f(&up).0 - f(&down).0) / (2.0 * step);
+                assert!(
+                    (numeric - derivative[c]).abs() < 2e-4,
+                    "{walk} {c} {numeric} {}",
+                    derivative[c]
+                );
             }
         }
     }

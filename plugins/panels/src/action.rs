@@ -1,6 +1,6 @@
 //! What a user can ask for.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use bevy_ecs::prelude::*;
 use intrados_light::{RenderSettings, View};
@@ -19,6 +19,7 @@ use crate::{
     dialog::{Dialogs, Purpose},
     edits::{self, Edit},
     export::Export,
+    history::History,
     layout::Layout,
     photos::Photos,
     recent::Recent,
@@ -88,6 +89,10 @@ pub enum Action {
     Photograph(PathBuf),
     /// Choose a photograph in a dialog.
     ChoosePhotograph,
+    /// Look at a prediction that was written beside the newest.
+    Compare(PathBuf),
+    /// Choose that prediction in a dialog.
+    ChoosePrediction,
     /// Fill in what is attached to the selected member, with files that were given already, and
     /// where it is: a share of its axis, and a face.
     Fill(Vec<PathBuf>, Option<(f32, Option<Face>)>),
@@ -249,6 +254,8 @@ fn carry_out(world: &mut World, action: Action) {
         }
         Action::ChoosePhotograph => Dialogs::open(world, Purpose::Photograph),
         Action::ChooseEvidence => Dialogs::open(world, Purpose::Evidence),
+        Action::Compare(path) => compare(world, &path),
+        Action::ChoosePrediction => Dialogs::open(world, Purpose::Prediction),
         Action::Fill(files, place) => fill(world, files, place),
         Action::Attach(what) => edits::begin(world, Edit::Attach(what)),
         Action::Detach(member, name) => edits::begin(world, Edit::Detach { member, name }),
@@ -285,6 +292,16 @@ fn fill(world: &mut World, files: Vec<PathBuf>, place: Option<(f32, Option<Face>
         None => world
             .resource_mut::<Banners>()
             .cannot("Attached to which member?", "select one first, in the picture or in the list"),
+    }
+}
+
+/// Opens an earlier prediction of the structure that is open.
+fn compare(world: &mut World, path: &Path) {
+    let Some(scene) = world.get_resource::<CurrentScene>().map(|s| s.0.clone()) else { return };
+    let opened = world.resource_mut::<History>().open(path, &scene);
+    match opened {
+        Ok(()) => show_tab(world, "Structure"),
+        Err(why) => world.resource_mut::<Banners>().cannot("No prediction to compare with", &why),
     }
 }
 

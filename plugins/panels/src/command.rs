@@ -109,6 +109,7 @@ fn fixed(look: &Look) -> Vec<Command> {
         command("both sides combined", "3", by(NONE, Key::Num3), Action::Show(View::Combined)),
         command("light or error", "E", by(NONE, Key::E), Action::ShowQuantity(quantity)),
         command("go on with the prediction", "", None, Action::Predict),
+        command("compare with an earlier prediction", "", None, Action::ChoosePrediction),
         command("reload the scene", "", None, Action::Reload),
         command("start screen", "", None, Action::StartScreen(true)),
         command("light theme", "", None, Action::Theme(egui::ThemePreference::Light)),

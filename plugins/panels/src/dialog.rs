@@ -32,6 +32,8 @@ pub(crate) enum Purpose {
     Photograph,
     /// Slices or a table.
     Evidence,
+    /// What `intrados predict` has written.
+    Prediction,
     /// With a proposal.
     Save(String),
     /// The same of what is no picture of light.
@@ -87,6 +89,10 @@ impl Dialogs {
                         .add_filter("Photographs", PHOTOGRAPHS)
                         .add_filter("All files", &["*"])
                         .pick_file(),
+                    Purpose::Prediction => rfd::FileDialog::new()
+                        .set_title("Open an earlier prediction")
+                        .add_filter("predict.json", &["json"])
+                        .pick_file(),
                     Purpose::Save(name) => rfd::FileDialog::new()
                         .set_title("Export the picture")
                         .add_filter("PNG, as shown", &["png"])
@@ -127,6 +133,7 @@ fn is_missing(purpose: &Purpose, banners: &mut Banners, log: &mut Log) {
         }
         Purpose::Evidence => "drop the files on the window, or type their path",
         Purpose::Photograph => "drop the photograph on the window, or type its path",
+        Purpose::Prediction => "drop its predict.json on the window",
         Purpose::Save(_) | Purpose::Take(_) => "type the file's name instead",
     };
     log.say(format!("no file dialog on this system: {instead}"));
@@ -154,6 +161,7 @@ pub(crate) fn take(
     match (purpose, chosen.pop()) {
         (Purpose::Open, Some(path)) => actions.ask(Action::Open(path)),
         (Purpose::Photograph, Some(path)) => actions.ask(Action::Photograph(path)),
+        (Purpose::Prediction, Some(path)) => actions.ask(Action::Compare(path)),
         (Purpose::Take(_), Some(path)) => saving.put(&path),
         (Purpose::Save(_), Some(path)) => export.path = path.display().to_string(),
         (purpose, None) if since.elapsed() < TOO_SOON => {

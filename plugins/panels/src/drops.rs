@@ -58,6 +58,9 @@ fn meant(world: &mut World, files: &[PathBuf], spot: Option<Spot>) -> Vec<Action
     let Some(last) = files.last() else { return Vec::new() };
     let scene = world.get_resource::<CurrentScene>().map(|s| s.0.clone());
     let Some(scene) = scene else { return vec![Action::Open(last.clone())] };
+    if last.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("json")) {
+        return vec![Action::Compare(last.clone())];
+    }
     let evidence: Option<Vec<Vec<PathBuf>>> = files.iter().map(|p| attach::evidence(p)).collect();
     let mut form = world.resource_mut::<Form>();
     if let (true, Some(evidence)) = (form.is_open, &evidence) {

@@ -15,6 +15,7 @@ mod drops;
 mod edits;
 mod export;
 mod fields;
+mod history;
 mod inspector;
 mod layout;
 mod log;

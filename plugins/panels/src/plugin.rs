@@ -9,7 +9,7 @@ use intrados_stage::Stage;
 use crate::{
     Actions, AddPanel, Banners, Latest, Log, Look, Place, Refine, Selection, Statistics, Viewpoint,
     action, attach, banner, command, convergence, create, ct, dialog, directions, drops, edits,
-    export, fields, inspector, layout, log, members, meters, outline, photos, picture,
+    export, fields, history, inspector, layout, log, members, meters, outline, photos, picture,
     place::Panels, prediction, recent, refine, render, report, saving, session, sheet, statistics,
     steering, stress, structure, toast, viewpoint, workspace,
 };
@@ -51,6 +51,7 @@ impl Plugin for PanelsPlugin {
             .init_resource::<Viewpoint>()
             .init_resource::<Statistics>()
             .init_resource::<Latest>()
+            .init_resource::<history::History>()
             .init_resource::<Log>()
             .init_resource::<picture::Picture>()
             .init_resource::<picture::Cursor>()
@@ -91,6 +92,7 @@ impl Plugin for PanelsPlugin {
                 Update,
                 (
                     prediction::gather,
+                    history::keep,
                     refine::keep_time,
                     picture::develop,
                     fields::paint,

@@ -5,7 +5,7 @@
 use std::{error::Error, fs, path::PathBuf};
 
 use glam::DVec3;
-use intrados_photo::{Located, Photograph, Pick, Prior, Site, by_edges, locate, picks};
+use intrados_photo::{Located, Photograph, Prior, Site, by_edges, locate, picks};
 use intrados_scene::{Lens, Scene};
 use intrados_stage::Job;
 use serde::Deserialize;
@@ -41,10 +41,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         let scene = Scene::open(&folder.join("scene.ron"), &job)?;
         let site = Site::new(&scene, &job)?;
         let photograph = Photograph::open(&folder.join("photo.jpg"))?;
-        let picks: Vec<Pick> = picks::read(&folder.join("picks.csv"), &scene, &site)?
-            .into_iter()
-            .map(|picked| picked.pick)
-            .collect();
+        let table = picks::read(&folder.join("picks.csv"), &scene, &site)?;
+        let picks = table.of("photo.jpg", true, &photograph);
         let focal = photograph.taken.focal(photograph.size);
         let lens = Lens::default();
         let prior = Prior { size: photograph.size, focal, lens, k1_error: 0.05, picking_px: 2.0 };

@@ -16,6 +16,7 @@ pub mod relight;
 pub mod series;
 mod similarity;
 pub mod site;
+pub mod tags;
 pub mod taken;
 
 pub use edges::by_edges;

@@ -1,4 +1,4 @@
-//! Tables of picks: which place is where in which photograph.
+//! Tables of picks: which place is where in which photograph, and which tag is where on a member.
 
 use std::path::{Path, PathBuf};
 
@@ -6,11 +6,33 @@ use glam::DVec3;
 use intrados_scene::Scene;
 use intrados_stage::access::{self, Denied};
 
-use crate::{Pick, site::Site};
+use crate::{
+    Photograph, Pick,
+    face::Surface,
+    site::Site,
+    tags::{self, TagAt},
+};
 
 /// Longest table, bytes.
 const LONGEST: u64 = 1 << 20;
-const COLUMNS: [&str; 8] = ["photo", "u", "v", "x", "y", "z", "member", "corner"];
+const COLUMNS: [&str; 14] = [
+    "photo",
+    "u",
+    "v",
+    "x",
+    "y",
+    "z",
+    "member",
+    "corner",
+    "tag",
+    "size_mm",
+    "face",
+    "along",
+    "across_mm",
+    "turn_deg",
+];
+/// Tags of the family 36h11.
+const TAGS: usize = 587;
 
 /// A row of a table.
 #[derive(Debug, Clone, PartialEq)]
@@ -19,6 +41,35 @@ pub struct PickedIn {
     pub photo: Option<String>,
     /// The pick.
     pub pick: Pick,
+}
+
+/// A table.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Picks {
+    /// What somebody picked.
+    pub picked: Vec<PickedIn>,
+    /// Tags that photographs may show.
+    pub tags: Vec<TagAt>,
+}
+
+impl Picks {
+    /// The picks of a photograph: those in it, by its file's name, those that name none where
+    /// `is_only` one is read, and the corners of its tags.
+    #[must_use]
+    pub fn of(&self, name: &str, is_only: bool, photograph: &Photograph) -> Vec<Pick> {
+        let is_of = |photo: &Option<String>, unnamed: bool| {
+            photo.as_ref().map_or(unnamed, |photo| photo == name)
+        };
+        let picked = self.picked.iter().filter(|p| is_of(&p.photo, is_only)).map(|p| p.pick);
+        let tags = self.tags.iter().filter(|tag| is_of(&tag.photo, true));
+        picked.chain(tags::picks(photograph, tags)).collect()
+    }
+
+    /// Names of the photographs that it speaks of.
+    pub fn photos(&self) -> impl Iterator<Item = &String> {
+        let tags = self.tags.iter().filter_map(|tag| tag.photo.as_ref());
+        self.picked.iter().filter_map(|p| p.photo.as_ref()).chain(tags)
+    }
 }
 
 /// Why a table of picks is not read.
@@ -47,10 +98,14 @@ pub enum PicksError {
 /// Reads a table with a head: `u`, `v` (pixels of the upright photograph from its top left), and
 /// either `x`, `y`, `z` (m) or `member`, `corner` (id or name, and the number that `intrados photo
 /// SCENE --corners MEMBER` prints); `photo` (a file's name) where it is of several photographs.
+/// A row of a tag has `tag` (its number in the family 36h11), `size_mm` (the edge of its black
+/// square), `member`, `face`, `along` (its middle, 0 to 1 of the axis), `across_mm` (to the right
+/// of the axis as one stands before the face; 0 where absent), and `turn_deg` where it does not
+/// stand upright along the axis (anticlockwise).
 ///
 /// # Errors
 /// [`PicksError`]: file, line and remedy.
-pub fn read(path: &Path, scene: &Scene, site: &Site) -> Result<Vec<PickedIn>, PicksError> {
+pub fn read(path: &Path, scene: &Scene, site: &Site) -> Result<Picks, PicksError> {
     let denied = |source| PicksError::Denied { path: path.to_owned(), source };
     let bytes = access::read(path, LONGEST).map_err(denied)?;
     parse(&bytes, scene, site).map_err(|(line, what)| PicksError::Bad {
@@ -62,7 +117,7 @@ pub fn read(path: &Path, scene: &Scene, site: &Site) -> Result<Vec<PickedIn>, Pi
 
 type Fault = (Option<u64>, String);
 
-fn parse(bytes: &[u8], scene: &Scene, site: &Site) -> Result<Vec<PickedIn>, Fault> {
+fn parse(bytes: &[u8], scene: &Scene, site: &Site) -> Result<Picks, Fault> {
     let mut reader =
         csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(bytes);
     let said = |error: csv::Error| {
@@ -75,41 +130,131 @@ fn parse(bytes: &[u8], scene: &Scene, site: &Site) -> Result<Vec<PickedIn>, Faul
         return Err((Some(1), format!("column {name:?} is not known: the columns are {all}")));
     }
     let column = |name: &str| head.iter().position(|h| h.trim_start_matches('\u{feff}') == name);
-    let mut picks = Vec::new();
+    let mut picks = Picks::default();
     for row in reader.records() {
         let row = row.map_err(said)?;
         let line = row.position().map(csv::Position::line);
         let cell = |name: &str| column(name).and_then(|k| row.get(k)).filter(|c| !c.is_empty());
-        let number = |name: &str| -> Result<f64, Fault> {
+        let number_of = |name: &str| -> Result<f64, Fault> {
             let text = cell(name).ok_or((line, format!("{name} is missing")))?;
             let value = text.parse::<f64>().ok().filter(|x| x.is_finite());
             value.ok_or((line, format!("{name} {text:?} is no number")))
         };
+        let photo = cell("photo").map(str::to_owned);
+        if let Some(tag) = cell("tag") {
+            if let Some(name) =
+                ["u", "v", "x", "y", "z", "corner"].into_iter().find(|n| cell(n).is_some())
+            {
+                let what = format!(
+                    "a tag has no {name}: the photograph says where it is, and member, face, along, across_mm where it was stuck"
+                );
+                return Err((line, what));
+            }
+            let number = tag.parse().ok().filter(|number| *number < TAGS);
+            let none = || {
+                format!(
+                    "tag {tag:?} is none of the family 36h11: give its number, 0 to {}",
+                    TAGS - 1
+                )
+            };
+            let number = number.ok_or_else(|| (line, none()))?;
+            let or_0 = |name: &str| if cell(name).is_some() { number_of(name) } else { Ok(0.0) };
+            let at = Stuck {
+                member: cell("member").unwrap_or_default(),
+                face: cell("face").unwrap_or_default(),
+                along: number_of("along")?,
+                across_mm: or_0("across_mm")?,
+                turn_deg: or_0("turn_deg")?,
+                size_mm: number_of("size_mm")?,
+            };
+            let corners = at.corners(scene, site).map_err(|what| (line, what))?;
+            if picks.tags.iter().any(|t| {
+                t.number == number && (t.photo == photo || t.photo.is_none() || photo.is_none())
+            }) {
+                return Err((line, format!("tag {number} is placed twice: print every one once")));
+            }
+            picks.tags.push(TagAt { photo, number, corners });
+            continue;
+        }
         let place = match (cell("member"), cell("corner")) {
             (Some(member), Some(corner)) if cell("x").is_none() => {
                 named(member, corner, scene, site).map_err(|what| (line, what))?
             }
-            (None, None) => DVec3::new(number("x")?, number("y")?, number("z")?),
+            (None, None) => DVec3::new(number_of("x")?, number_of("y")?, number_of("z")?),
             _ => {
                 let what = "give either x, y, z or member, corner";
                 return Err((line, what.into()));
             }
         };
-        let pick = Pick { pixel: [number("u")?, number("v")?], place };
-        picks.push(PickedIn { photo: cell("photo").map(str::to_owned), pick });
+        let pick = Pick { pixel: [number_of("u")?, number_of("v")?], place };
+        picks.picked.push(PickedIn { photo, pick });
     }
     Ok(picks)
 }
 
-/// A corner of a member by its number.
-fn named(member: &str, corner: &str, scene: &Scene, site: &Site) -> Result<DVec3, String> {
+/// A member's surface by its id or name.
+fn surface<'a>(
+    member: &str,
+    scene: &Scene,
+    site: &'a Site,
+) -> Result<(String, Option<&'a Surface>), String> {
     let id = scene.id_of(member).map_err(|found| match found {
         0 => format!("there is no member {member:?}: `intrados info` lists them"),
         _ => format!("{found} members are called {member:?}: give the id"),
     })?;
     let index = scene.members.iter().position(|m| m.id == id);
-    let outline = index.and_then(|index| Some(site.surface(index)?.outline()));
-    let corners = outline.map_or(Vec::new(), |outline| outline.corners);
+    Ok((id.to_owned(), index.and_then(|index| site.surface(index))))
+}
+
+/// Where a tag was stuck.
+struct Stuck<'a> {
+    member: &'a str,
+    face: &'a str,
+    along: f64,
+    across_mm: f64,
+    turn_deg: f64,
+    size_mm: f64,
+}
+
+impl Stuck<'_> {
+    /// Corners of its black square, as [`TagAt`] has them.
+    fn corners(&self, scene: &Scene, site: &Site) -> Result<[DVec3; 4], String> {
+        let (id, surface) = surface(self.member, scene, site)?;
+        let surface = surface.ok_or_else(|| format!("{id} has no surface of its own"))?;
+        let face = surface.faces.iter().find(|face| face.name.eq_ignore_ascii_case(self.face));
+        let face = face.ok_or_else(|| {
+            let names: Vec<&str> = surface.faces.iter().map(|face| face.name.as_str()).collect();
+            format!("{id} has no face {:?}: it has {}", self.face, names.join(", "))
+        })?;
+        for (name, value, [low, high]) in [
+            ("along", self.along, [0.0, 1.0]),
+            ("size_mm", self.size_mm, [1.0, 2000.0]),
+            ("across_mm", self.across_mm, [-1e5, 1e5]),
+            ("turn_deg", self.turn_deg, [-360.0, 360.0]),
+        ] {
+            if !(low..=high).contains(&value) {
+                return Err(format!("{name} {value} is not between {low} and {high}"));
+            }
+        }
+        let middle = [1e-3 * self.across_mm, self.along * surface.length()];
+        let (sin, cos) = self.turn_deg.to_radians().sin_cos();
+        let half = 0.5e-3 * self.size_mm;
+        let at = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]].map(|[x, y]| {
+            [middle[0] + half * (cos * x - sin * y), middle[1] + half * (sin * x + cos * y)]
+        });
+        let places: Vec<DVec3> =
+            surface.places(face, &at).into_iter().flatten().map(|[place, _]| place).collect();
+        let off = || {
+            format!("it does not lie on the face {} of {id}: see along and across_mm", face.name)
+        };
+        places.try_into().map_err(|_| off())
+    }
+}
+
+/// A corner of a member by its number.
+fn named(member: &str, corner: &str, scene: &Scene, site: &Site) -> Result<DVec3, String> {
+    let (id, surface) = surface(member, scene, site)?;
+    let corners = surface.map_or(Vec::new(), |surface| surface.outline().corners);
     let number: Option<usize> = corner.parse().ok();
     let found = number.and_then(|number| corners.get(number.checked_sub(1)?));
     found.copied().ok_or_else(|| {

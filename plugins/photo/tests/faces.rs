@@ -201,12 +201,12 @@ fn picks_are_read_and_bad_ones_refused_with_their_line() {
         picks::read(&table, &scene, &site).map_err(|error| error.to_string())
     };
     let good = "photo,u,v,x,y,z,member,corner\na.jpg, 10.5,20,,,,C2,1\nb.jpg,3,4,1,2,-3,,\n";
-    let good = read(good).unwrap();
+    let good = read(good).unwrap().picked;
     assert!(good[0].pick.place.distance(DVec3::new(1.9, 0.0, 1.5)) < 1e-6);
     assert_eq!(good[0].pick.pixel, [10.5, 20.0]);
     assert_eq!(good[1].pick.place, DVec3::new(1.0, 2.0, -3.0));
     assert_eq!(good[1].photo.as_deref(), Some("b.jpg"));
-    assert_eq!(read("\u{feff}u,v,x,y,z\n1,2,3,4,5\n").unwrap().len(), 1);
+    assert_eq!(read("\u{feff}u,v,x,y,z\n1,2,3,4,5\n").unwrap().picked.len(), 1);
     for (text, place, word) in [
         ("u,v,member,corner\n1,2,C2,1\n1,2,C9,1\n", ":3: ", "intrados info"),
         ("u,v,member,corner\n1,2,C2,9\n", ":2: ", "--corners C2"),

@@ -22,8 +22,13 @@ pub use stages::{Stage, StagePlugin};
 
 // Not used here. The window and the tests ask these crates of others for more than the rest of the
 // program does; asked for alike everywhere, they and all that rests on them are built once.
+use async_task as _;
 use bytemuck as _;
+use concurrent_queue as _;
+use futures_core as _;
+use futures_lite as _;
 use getrandom as _;
 use hashbrown as _;
 use regex_syntax as _;
 use smallvec as _;
+use uuid as _;

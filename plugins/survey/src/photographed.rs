@@ -74,15 +74,19 @@ pub fn prior(photo: &Photographed, photograph: &Photograph) -> Prior {
     }
 }
 
-/// The picks that its table has of a photograph.
+/// The picks that its table has of a photograph, and those of its tags.
 ///
 /// # Errors
 /// File, line and remedy.
-pub fn picks(photo: &Photographed, scene: &Scene, site: &Site) -> Result<Vec<Pick>, PhotoError> {
-    let name = photo.file.file_name().map(|n| n.to_string_lossy().into_owned());
-    let all = intrados_photo::picks::read(&photo.picks, scene, site).map_err(because)?;
-    let of_it = all.iter().filter(|p| p.photo.is_none() || p.photo == name);
-    Ok(of_it.map(|p| p.pick).collect())
+pub fn picks(
+    photo: &Photographed,
+    photograph: &Photograph,
+    scene: &Scene,
+    site: &Site,
+) -> Result<Vec<Pick>, PhotoError> {
+    let name = photo.file.file_name().unwrap_or_default().to_string_lossy();
+    let table = intrados_photo::picks::read(&photo.picks, scene, site).map_err(because)?;
+    Ok(table.of(&name, true, photograph))
 }
 
 /// Opens a photograph and finds out where it was taken from.
@@ -96,7 +100,7 @@ pub fn placed(
 ) -> Result<(Photograph, Site, Located), PhotoError> {
     let photograph = Photograph::open(&photo.file).map_err(because)?;
     let site = Site::new(scene, job)?;
-    let picks = picks(photo, scene, &site)?;
+    let picks = picks(photo, &photograph, scene, &site)?;
     let prior = prior(photo, &photograph);
     let located = site.locate(&photograph, &picks, &prior).map_err(because)?;
     Ok((photograph, site, located))

@@ -223,14 +223,10 @@ pub(crate) fn integrate(
     nodes: &[DVec3; 8],
     u: &[f64; 24],
     modes: &mut Modes,
-    mut law: impl FnMut(usize, &Voigt) -> (Voigt, Tangent),
+    law: impl FnMut(usize, &Voigt) -> (Voigt, Tangent),
 ) -> Result<Solid, ElementError> {
-    let points = || GAUSS.into_iter().enumerate().map(|(point, natural)| (point, natural, 1.0));
     match kind {
-        Kind::Incompatible => {
-            let map = Map::new(nodes, DVec3::ZERO)?;
-            settle(&map, points, u, modes, &[0.0; 9], |point, strain| law(point, strain))
-        }
+        Kind::Incompatible => settle(&Map::new(nodes)?, u, modes, law),
         _ => linearize(kind, nodes, u, modes, law),
     }
 }
@@ -251,45 +247,39 @@ pub(crate) fn linearize(
     modes: &Modes,
     mut law: impl FnMut(usize, &Voigt) -> (Voigt, Tangent),
 ) -> Result<Solid, ElementError> {
-    let points = GAUSS.into_iter().enumerate().map(|(point, natural)| (point, natural, 1.0));
     match kind {
         Kind::Incompatible => {
-            sweep(&Map::new(nodes, DVec3::ZERO)?, points, &columns::<12>(u, &modes.0), &mut law)?
-                .condense(&[0.0; 9])
+            sweep(&Map::new(nodes)?, &columns::<12>(u, &modes.0), &mut law)?.condense()
         }
-        Kind::Plain => {
-            sweep(&Map::new(nodes, DVec3::ZERO)?, points, &columns::<8>(u, &[]), &mut law)?.plain()
-        }
+        Kind::Plain => sweep(&Map::new(nodes)?, &columns::<8>(u, &[]), &mut law)?.plain(),
         Kind::Assumed => {
             let Element { stiffness, force } = assumed::integrate(nodes, u, law)?;
             let (follow, step) = ([[0.0; 24]; 9], [0.0; 9]);
             Ok(Solid { stiffness, force, follow, step, unsettled: 0.0 })
         }
         Kind::MeanDilatation => {
-            sweep(&Map::averaged(nodes)?, points, &columns::<8>(u, &[]), &mut law)?.plain()
+            sweep(&Map::averaged(nodes)?, &columns::<8>(u, &[]), &mut law)?.plain()
         }
     }
 }
 
-/// Newton for the modes: f_α(u, α) = held.
-pub(super) fn settle<I: Iterator<Item = (usize, DVec3, f64)>>(
+/// Newton for the modes: f_α(u, α) = 0.
+fn settle(
     map: &Map,
-    points: impl Fn() -> I,
     u: &[f64; 24],
     modes: &mut Modes,
-    held: &[f64; 9],
     mut law: impl FnMut(usize, &Voigt) -> (Voigt, Tangent),
 ) -> Result<Solid, ElementError> {
     for _ in 0..STEPS {
-        let sum = sweep(map, points(), &columns::<12>(u, &modes.0), &mut law)?;
-        match sum.relax(held) {
+        let sum = sweep(map, &columns::<12>(u, &modes.0), &mut law)?;
+        match sum.relax() {
             Some((step, unsettled)) if unsettled > SETTLED => {
                 modes.0.iter_mut().zip(step).for_each(|(mode, step)| *mode += step)
             }
-            _ => return sum.condense(held),
+            _ => return sum.condense(),
         }
     }
-    sweep(map, points(), &columns::<12>(u, &modes.0), &mut law)?.condense(held)
+    sweep(map, &columns::<12>(u, &modes.0), &mut law)?.condense()
 }
 
 /// The strain at a natural coordinate as rows over the nodes' displacements and over the modes.
@@ -338,11 +328,7 @@ pub(crate) fn rows(kind: Kind, nodes: &[DVec3; 8], natural: DVec3) -> Result<Row
     if kind == Kind::Assumed {
         return Ok(Rows { nodes: assumed::rows(nodes, natural)?, modes: [[0.0; 9]; 6] });
     }
-    let map = if kind == Kind::MeanDilatation {
-        Map::averaged(nodes)?
-    } else {
-        Map::new(nodes, DVec3::ZERO)?
-    };
+    let map = if kind == Kind::MeanDilatation { Map::averaged(nodes)? } else { Map::new(nodes)? };
     let mut rows = map.rows(natural)?;
     if kind != Kind::Incompatible {
         rows.modes = [[0.0; 9]; 6];
@@ -351,13 +337,11 @@ pub(crate) fn rows(kind: Kind, nodes: &[DVec3; 8], natural: DVec3) -> Result<Row
 }
 
 /// An element's shape, and what is the same at all its points.
-pub(super) struct Map<'a> {
+struct Map<'a> {
     nodes: &'a [DVec3; 8],
     /// J₀⁻ᵀ and j₀ of the centre.
     centre: DMat3,
     centre_det: f64,
-    /// Where the modes have their tops; the origin but for layered elements.
-    shift: DVec3,
     /// Volume averages of the gradients, for the mean dilatation.
     mean: Option<[[f64; 8]; 3]>,
 }
@@ -371,14 +355,14 @@ struct Place<const N: usize> {
 }
 
 impl<'a> Map<'a> {
-    pub(super) fn new(nodes: &'a [DVec3; 8], shift: DVec3) -> Result<Self, ElementError> {
+    fn new(nodes: &'a [DVec3; 8]) -> Result<Self, ElementError> {
         let matrix = jacobian(nodes, DVec3::ZERO);
         let centre_det = right_way_round(matrix.determinant(), 0)?;
-        Ok(Self { nodes, centre: matrix.inverse().transpose(), centre_det, shift, mean: None })
+        Ok(Self { nodes, centre: matrix.inverse().transpose(), centre_det, mean: None })
     }
 
     fn averaged(nodes: &'a [DVec3; 8]) -> Result<Self, ElementError> {
-        let mut map = Self::new(nodes, DVec3::ZERO)?;
+        let mut map = Self::new(nodes)?;
         let (mut mean, mut volume) = ([[0.0; 8]; 3], 0.0);
         for (point, natural) in GAUSS.into_iter().enumerate() {
             let place = map.place::<8>(natural, point)?;
@@ -402,7 +386,7 @@ impl<'a> Map<'a> {
         let mut put = |a: usize, g: DVec3| (0..3).for_each(|axis| gradients[axis][a] = g[axis]);
         of_nodes.into_iter().enumerate().for_each(|(a, gradient)| put(a, gradient));
         if N > 8 {
-            let top = -2.0 * (natural - self.shift) * (self.centre_det / det);
+            let top = -2.0 * natural * (self.centre_det / det);
             put(8, self.centre.x_axis * top.x);
             put(9, self.centre.y_axis * top.y);
             put(10, self.centre.z_axis * top.z);
@@ -419,7 +403,7 @@ impl<'a> Map<'a> {
         Ok(Place { gradients, swelling, det })
     }
 
-    pub(super) fn rows(&self, natural: DVec3) -> Result<Rows, ElementError> {
+    fn rows(&self, natural: DVec3) -> Result<Rows, ElementError> {
         let place = self.place::<12>(natural, 0)?;
         let mut rows = Rows { nodes: [[0.0; 24]; 6], modes: [[0.0; 9]; 6] };
         let mut put = |k: usize, a: usize, i: usize, value: f64| {
@@ -478,7 +462,6 @@ struct Sum<const N: usize> {
 
 fn sweep<const N: usize>(
     map: &Map,
-    points: impl Iterator<Item = (usize, DVec3, f64)>,
     x: &[[f64; N]; 3],
     law: &mut impl FnMut(usize, &Voigt) -> (Voigt, Tangent),
 ) -> Result<Sum<N>, ElementError> {
@@ -489,12 +472,12 @@ fn sweep<const N: usize>(
         steepest: 0.0,
         strain: 0.0,
     };
-    for (point, natural, weight) in points {
+    for (point, natural) in GAUSS.into_iter().enumerate() {
         let place = map.place::<N>(natural, point)?;
         let strain = place.strain(x);
         let (stress, tangent) = law(point, &strain);
         sum.strain = sum.strain.max(largest(&strain));
-        sum.add(&place, &stress, &tangent, weight * place.det);
+        sum.add(&place, &stress, &tangent, place.det);
     }
     Ok(sum)
 }
@@ -587,8 +570,8 @@ impl<const N: usize> Sum<N> {
         }
     }
 
-    fn modes(&self, held: &[f64; 9]) -> (SMatrix<f64, 9, 9>, [f64; 9]) {
-        let off = std::array::from_fn(|m| self.force[m % 3][8 + m / 3] - held[m]);
+    fn modes(&self) -> (SMatrix<f64, 9, 9>, [f64; 9]) {
+        let off = std::array::from_fn(|m| self.force[m % 3][8 + m / 3]);
         (SMatrix::from_fn(|r, c| self.entry(24 + r, 24 + c)), off)
     }
 
@@ -601,10 +584,10 @@ impl<const N: usize> Sum<N> {
         }
     }
 
-    /// Newton's step of the modes towards f_α = held, and how far off they are; `None` where
+    /// Newton's step of the modes towards f_α = 0, and how far off they are; `None` where
     /// nothing holds them.
-    fn relax(&self, held: &[f64; 9]) -> Option<([f64; 9], f64)> {
-        let (matrix, off) = self.modes(held);
+    fn relax(&self) -> Option<([f64; 9], f64)> {
+        let (matrix, off) = self.modes();
         let step = matrix
             .lu()
             .solve(&SVector::from(off.map(|f| -f)))
@@ -612,10 +595,10 @@ impl<const N: usize> Sum<N> {
         Some((step.into(), self.unsettled(&off, step.as_ref())))
     }
 
-    /// Node by node, modes condensed so that f_α = held.
-    fn condense(&self, held: &[f64; 9]) -> Result<Solid, ElementError> {
+    /// Node by node, modes condensed so that f_α = 0.
+    fn condense(&self) -> Result<Solid, ElementError> {
         let mut solid = self.plain()?;
-        let (matrix, off) = self.modes(held);
+        let (matrix, off) = self.modes();
         let right =
             SMatrix::<f64, 9, 25>::from_fn(
                 |r, c| if c < 24 { self.entry(24 + r, c) } else { off[r] },

@@ -10,7 +10,6 @@
 //! | module | element |
 //! |---|---|
 //! | [`hex8`] | brick of eight nodes: plain, mean dilatation, incompatible modes; its loads are in [`load`], its scalar matrices in [`scalar`]; [`assumed`] is its shear where it softens |
-//! | [`layered`] | brick whose layers are born in turn |
 //! | [`rod`] | bar of two nodes; [`embed`] lays bars and tendons through bricks, bonded or slipping |
 //! | [`interface`] | joint of zero thickness between two faces |
 //! | [`spring`] | ground on a face |
@@ -21,7 +20,6 @@ pub(crate) mod assumed;
 pub mod embed;
 pub mod hex8;
 pub(crate) mod interface;
-pub mod layered;
 pub(crate) mod load;
 pub(crate) mod quad;
 pub mod rod;

@@ -18,7 +18,7 @@
 //! the crack is shut, and slide at the limit of Vecchio and Collins and μ times what presses them
 //! (`Faces`).
 //!
-//! The measure of the law judges stress on what is left of the planes, σᵢ/(1 − dᵢ) and τᵢⱼ, and
+//! The law's equivalent strain judges stress on what is left of the planes, σᵢ/(1 − dᵢ) and τᵢⱼ, and
 //! each plane is asked for its share of that equivalent strain, by its tension over the largest. In
 //! a first crack under any steady stress that is what one damage for all directions does.
 //! Compression is crushed by the part of the stress that presses: σ = σ⁺ + (1 − d_c) σ⁻ (Faria,
@@ -419,7 +419,7 @@ impl Concrete {
         let delayed = tensor::scale(&tensor::sub(&drive, &state.drive), clock.increment.delayed);
         let creep = tensor::add(&tensor::add(&state.creep, past), &delayed);
         let share = tensor::scale(&creep, self.setting.creep_share);
-        let (asked, _) = self.measure.of(&tensor::add(&section, &share), nu);
+        let (asked, _) = self.equivalent(&tensor::add(&section, &share));
         let share = tensor::von_mises(&tensor::apply(&hooke, &share));
         // A strain that is not finite is for the whole law to tell.
         if !(asked <= bears && clock.is_harmless(tensor::von_mises(&stress) + share)) {
@@ -482,7 +482,7 @@ impl Concrete {
         let judged = tensor::add(&cracked.section, &tensor::rotate_stress(&share, axes));
         let most = judged[..3].iter().fold(0.0, |m: f64, s| m.max(*s));
         let (value, _) = if most > 0.0 {
-            self.measure.of(&tensor::apply(&tensor::compliance(e, nu), &judged), nu)
+            self.equivalent(&tensor::apply(&tensor::compliance(e, nu), &judged))
         } else {
             (0.0, ZERO)
         };
@@ -576,9 +576,9 @@ impl Concrete {
 #[cfg(test)]
 mod tests {
     use super::super::DAY;
+    use super::super::Error;
     use super::super::concrete::{Class, Code, Given, Properties};
     use super::super::law::{Cracks, Setting};
-    use super::super::{Error, damage::Measure};
     use super::*;
     use crate::tensor::tests::{largest, random};
 
@@ -626,12 +626,9 @@ mod tests {
         }
     }
 
-    fn law(measure: Option<Measure>) -> Concrete {
-        Concrete::new(
-            c30(),
-            Setting { cracks: Cracks::Planes, measure, ..Setting::short_term(0.05) },
-        )
-        .unwrap()
+    fn law() -> Concrete {
+        Concrete::new(c30(), Setting { cracks: Cracks::Planes, ..Setting::short_term(0.05) })
+            .unwrap()
     }
 
     /// Stress along x and y at the strain along x and no stress along z, nor along y where that
@@ -699,33 +696,31 @@ mod tests {
     /// nothing.
     #[test]
     fn concrete_cracked_one_way_bears_the_other_way() {
-        for measure in [None, Some(Measure::Rankine)] {
-            let law = law(measure);
-            let p = law.properties().clone();
-            let tension = Knee::of(p.modulus, p.fctm, p.fracture_energy, 0.05);
-            let mut state = law.born(0.0, 28.0 * DAY);
-            for k in 1..=60 {
-                let strain = 1.5e-5 * f64::from(k);
-                let answer = pulled(&law, strain, None, &state);
-                let expected = (1.0 - tension.damage(strain)) * p.modulus * strain;
-                assert!(
-                    (answer.stress[0] - expected).abs() < 1e-4 * p.fctm,
-                    "{measure:?} {strain} {} {expected}",
-                    answer.stress[0]
-                );
-                state = answer.state;
-            }
-            assert!(state.damage[0] > 0.95);
-            let shut = pulled(&law, -2e-4, None, &state);
-            assert!((shut.stress[0] + 2e-4 * p.modulus).abs() < 1e-3 * p.fcm, "{}", shut.stress[0]);
-            let mut most = 0.0_f64;
-            for k in 1..=60 {
-                let answer = pulled(&law, 9e-4, Some(5e-6 * f64::from(k)), &state);
-                most = most.max(answer.stress[1]);
-                state = answer.state;
-            }
-            assert!((most / p.fctm - 1.0).abs() < 0.1, "{measure:?}: {most} of {}", p.fctm);
+        let law = law();
+        let p = law.properties().clone();
+        let tension = Knee::of(p.modulus, p.fctm, p.fracture_energy, 0.05);
+        let mut state = law.born(0.0, 28.0 * DAY);
+        for k in 1..=60 {
+            let strain = 1.5e-5 * f64::from(k);
+            let answer = pulled(&law, strain, None, &state);
+            let expected = (1.0 - tension.damage(strain)) * p.modulus * strain;
+            assert!(
+                (answer.stress[0] - expected).abs() < 1e-4 * p.fctm,
+                "{strain} {} {expected}",
+                answer.stress[0]
+            );
+            state = answer.state;
         }
+        assert!(state.damage[0] > 0.95);
+        let shut = pulled(&law, -2e-4, None, &state);
+        assert!((shut.stress[0] + 2e-4 * p.modulus).abs() < 1e-3 * p.fcm, "{}", shut.stress[0]);
+        let mut most = 0.0_f64;
+        for k in 1..=60 {
+            let answer = pulled(&law, 9e-4, Some(5e-6 * f64::from(k)), &state);
+            most = most.max(answer.stress[1]);
+            state = answer.state;
+        }
+        assert!((most / p.fctm - 1.0).abs() < 0.1, "{most} of {}", p.fctm);
     }
 
     /// Faces of a crack slip by Walraven's stiffness and slide at Vecchio and Collins' limit while
@@ -733,7 +728,7 @@ mod tests {
     /// them.
     #[test]
     fn faces_interlock_and_rub() {
-        let law = law(None);
+        let law = law();
         let p = law.properties().clone();
         let shear = 0.5 * p.modulus / (1.0 + p.poisson);
         let root = (1e-6 * p.fcm).sqrt();
@@ -766,7 +761,7 @@ mod tests {
     /// along the strain and below the strength; grown, they stay where they are.
     #[test]
     fn planes_turn_while_they_are_young() {
-        let law = law(Some(Measure::Rankine));
+        let law = law();
         let p = law.properties().clone();
         let mut state = law.born(0.0, 28.0 * DAY);
         let first = p.fctm / p.modulus;
@@ -799,7 +794,7 @@ mod tests {
 
     #[test]
     fn compression_is_that_of_softening() {
-        let law = law(None);
+        let law = law();
         let p = law.properties().clone();
         let compression =
             Compression::new(p.modulus, p.fcm, p.peak_strain, p.crushing_energy, 0.05).unwrap();
@@ -821,7 +816,7 @@ mod tests {
     /// never falls.
     #[test]
     fn dissipation_is_never_negative() {
-        let law = law(None);
+        let law = law();
         for path in 0..30 {
             let mut state = law.born(0.0, 28.0 * DAY);
             let (mut work, mut dissipated, mut stress) = (0.0, 0.0, ZERO);
@@ -865,7 +860,7 @@ mod tests {
     /// law comes by itself.
     #[test]
     fn damage_given_in_full_is_damage_found() {
-        let law = law(None);
+        let law = law();
         let born = law.born(0.0, 28.0 * DAY);
         let strain = [3e-4, 0.0, 0.0, 0.0, 0.0, 0.0];
         let held = law.respond_cracked(&strain, Some(0.0), &born, &NOW);

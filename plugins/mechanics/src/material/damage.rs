@@ -12,34 +12,7 @@
 //! it is solved without iteration, and at constant damage the tangent is also the secant, symmetric
 //! and positive definite.
 
-use crate::tensor::{self, Equivalent, Frame, Principal, Tangent, Voigt};
-
-/// How three-dimensional strain is compared with the strain at the tensile peak.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Measure {
-    /// De Vree's modified von Mises strain with k = f_c/f_t.
-    ModifiedVonMises {
-        /// f_c/f_t.
-        k: f64,
-    },
-    /// Mazars' √Σ⟨εᵢ⟩². In compression it counts the lateral strain and begins at about a third of
-    /// f_c.
-    Mazars,
-    /// Rankine's largest principal stress of the undamaged material, over E.
-    Rankine,
-}
-
-impl Measure {
-    /// The equivalent strain and its derivative.
-    #[must_use]
-    pub(crate) fn of(&self, strain: &Voigt, nu: f64) -> Equivalent {
-        match *self {
-            Self::ModifiedVonMises { k } => tensor::modified_von_mises(strain, k, nu),
-            Self::Mazars => tensor::mazars(strain),
-            Self::Rankine => tensor::rankine(strain, nu),
-        }
-    }
-}
+use crate::tensor::{self, Frame, Principal, Tangent, Voigt};
 
 /// Elasticity with a damage of tension and a damage of compression.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -62,8 +35,8 @@ pub(crate) struct Split {
     /// Strain of elasticity and damage, without the creep of the step.
     pub mechanical: [f64; 3],
     /// Strain of the undamaged material under the stress on what is left of the section, C⁻¹ σᵢ/(1
-    /// − dᵢ): what [`Measure`] judges. (The mechanical strain itself would not do: an open crack
-    /// does not contract its flanks, which the measures take for more tension.)
+    /// − dᵢ): what the equivalent strain judges. (The mechanical strain itself would not do: an open crack
+    /// does not contract its flanks, which it would take for more tension.)
     pub effective: [f64; 3],
     /// What drives creep: C_ν σ with compression counted on what is left of the section, σ/(1 −
     /// d_c), Pa.

@@ -10,7 +10,7 @@
 //! |---|---|---|
 //! | [`concrete`] | strengths, moduli, fracture energy from a class or a strength, and their growth with age | EN 1992-1-1 §3.1, fib MC2010 §5.1 |
 //! | [`creep`], [`chain`] | creep and shrinkage of the codes; the Kelvin chain that computes them in O(1) a step | EN 1992-1-1 Annex B, fib MC2010 §5.1.9 |
-//! | [`softening`], [`damage`] | tension and compression after the peak, regularised by the size of the element; damage | Bažant and Oh 1983, de Vree 1995, Mazars 1984 |
+//! | [`softening`], [`damage`] | tension and compression after the peak, regularised by the size of the element; damage | Bažant and Oh 1983, de Vree 1995 |
 //! | [`cracks`] | cracks in three planes that turn while they are young, and interlock once grown | Rots and Blaauwendraad 1989, Jirásek and Zimmermann 1998, Walraven 1981, Vecchio and Collins 1986 |
 //! | [`law`] | all of these in one law of ageing, creeping, cracking concrete | |
 //! | [`steel`] | bars, and strands that relax | EN 1992-1-1 §3.2, §3.3 |

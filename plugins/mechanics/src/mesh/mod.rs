@@ -4,7 +4,6 @@
 //! - [`section`] (rectangle, box girder, disc, extruded), [`block`], [`mapped`], [`Polar`] (rings
 //!   and linings in r-θ-z): structured meshes.
 //! - [`Mesh::separate`]: a body is cut open and interfaces put between.
-//! - [`Mesh::refine`]: every hexahedron into equal parts.
 //! - [`voxel`]: any closed surface to cubes, with the error that this makes.
 //! - [`Locator`]: which hexahedron holds a point, and where in it.
 //!
@@ -16,7 +15,6 @@ pub mod hex;
 mod join;
 mod locate;
 mod polar;
-mod refine;
 pub(crate) mod section;
 mod topology;
 pub mod voxel;

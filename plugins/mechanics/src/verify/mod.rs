@@ -68,7 +68,7 @@ type Checks = Result<Vec<Check>, Trouble>;
 /// A part of the battery: its name in case that it fails, and its checks.
 type Part = (&'static str, fn(&Job) -> Checks);
 
-const PARTS: [Part; 28] = [
+const PARTS: [Part; 29] = [
     ("patch test", solids::patch),
     ("cantilever", solids::cantilever),
     ("Lamé's cylinder", solids::lame),
@@ -94,6 +94,7 @@ const PARTS: [Part; 28] = [
     ("localisation in a bar", crack::localisation),
     ("Janssen's joint", crack::janssen),
     ("column of second order", turning::beam_column),
+    ("column that creeps", turning::creeping),
     ("elastica", turning::elastica),
     ("buckled column", turning::buckled),
     ("dual", dual::softening),

@@ -25,9 +25,13 @@ fn brick(matter: Matter, area: f64) -> Result<Model, Trouble> {
     Ok(model)
 }
 
+/// A strong concrete of this modulus, Pa.
+pub(super) fn of_modulus(modulus: f64) -> Given {
+    Given { fcm: Some(60e6), modulus: Some(modulus), ..Given::default() }
+}
+
 /// Concrete of constant modulus and strength that creeps by a chain of its own.
-fn chained(modulus: f64, units: &[(f64, f64)]) -> Result<Matter, Trouble> {
-    let given = Given { fcm: Some(60e6), modulus: Some(modulus), ..Given::default() };
+pub(super) fn chained(given: Given, units: &[(f64, f64)]) -> Result<Matter, Trouble> {
     let setting = Setting { chain: Some(Chain::constant(units)), ..Setting::short_term(0.5) };
     Ok(Matter::Concrete(Box::new((given.complete()?, setting))))
 }
@@ -65,7 +69,7 @@ fn stress_of(structure: &System, history: &History, hex: usize) -> Result<f64, T
 pub(super) fn standard_solid(job: &Job) -> Checks {
     let strain = -1e-4;
     let relaxed = |n: usize| -> Result<f64, Trouble> {
-        let mut model = brick(chained(30e9, &[(20e9, 100.0)])?, 0.16)?;
+        let mut model = brick(chained(of_modulus(30e9), &[(20e9, 100.0)])?, 0.16)?;
         let moved = end(&model).into_iter().map(|n| (n, 0, LENGTH * strain)).collect();
         model.loads.push(Load {
             name: "strain".into(),
@@ -114,7 +118,7 @@ pub(super) fn column(job: &Job) -> Checks {
     let steel_area = 12.0 * std::f64::consts::PI * 0.016_f64.powi(2) / 4.0;
     let x = duration_of(chi);
     let unit = (modulus * (1.0 - (-x).exp()) / phi, end_time / x);
-    let mut model = brick(chained(modulus, &[unit])?, 0.16 - steel_area)?;
+    let mut model = brick(chained(of_modulus(modulus), &[unit])?, 0.16 - steel_area)?;
     let axis = [0.0, LENGTH].map(|x| DVec3::new(x, 0.5 * (0.16 - steel_area) / 0.4, 0.2));
     let locator = Locator::new(&model.mesh);
     let pieces = embed(

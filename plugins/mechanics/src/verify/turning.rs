@@ -3,8 +3,13 @@
 use glam::DVec3;
 use intrados_stage::Job;
 
-use super::{Checks, STRICT, Trouble, elastic, hold, model, near, node, steps, within};
+use super::{
+    Checks, STRICT, Trouble, elastic, hold, model, near, node, steps,
+    time::{chained, of_modulus},
+    within,
+};
 use crate::{
+    material::concrete::Given,
     mesh::block,
     model::{Action, Control, Drive, History, Load, March, MarchSettings, Matter, Model, System},
 };
@@ -21,8 +26,12 @@ const STIFFNESS: f64 = MODULUS * THICK * THICK * THICK / 12.0;
 
 /// A strip of `n` bricks, clamped at x = 0, with forces (N in all) at its end.
 fn strip(n: usize, forces: &[DVec3]) -> Result<Model, Trouble> {
+    strip_of(Matter::Elastic(elastic(MODULUS, 0.0)), n, forces)
+}
+
+fn strip_of(matter: Matter, n: usize, forces: &[DVec3]) -> Result<Model, Trouble> {
     let mesh = block(&steps(0.0, LENGTH, n), &[0.0, THICK], &[0.0, 1.0], "strip")?;
-    let mut model = model(mesh, Matter::Elastic(elastic(MODULUS, 0.0)));
+    let mut model = model(mesh, matter);
     (0..3).for_each(|c| hold(&mut model, c, |p| near(p.x, 0.0)));
     hold(&mut model, 2, |p| near(p.z, 0.0));
     for force in forces {
@@ -84,6 +93,50 @@ fn solve_turned(structure: &System, job: &Job) -> Result<History, Trouble> {
     let mut march = March::new(structure, start, Drive::Loads, SETTINGS);
     march.advance(1.0, 0.0, job, |_, _| Ok(()))?;
     Ok(march.history)
+}
+
+/// P–Δ with creep: a column pressed by .3 of Euler's load and bent by a force P across its end, of a
+/// standard solid that yields twice as much in the end (a spring E, a Kelvin unit E and τ).
+///
+/// Its deflection is Σ aₙ(t) (1 − cos kₙx), kₙ = nπ/2L, n odd: slopes and curvatures of these are
+/// orthogonal, so that each aₙ obeys kₙ² I aₙ = J ∗ d(N aₙ + 2P/L kₙ²) by itself, and goes from
+/// aₙ(0) to aₙ(∞), those of the moduli E and E/2, with the rate (1 − (N/E)/(kₙ² I − N/E))/τ.
+pub(super) fn creeping(job: &Job) -> Checks {
+    const DELAY: f64 = 100.0;
+    let euler = (0.5 * std::f64::consts::PI / LENGTH).powi(2) * STIFFNESS;
+    let (axial, across) = (0.3 * euler, 1e-4 * STIFFNESS / LENGTH.powi(2));
+    let inertia = STIFFNESS / MODULUS;
+    let exact = |time: f64| -> f64 {
+        let mode = |n: u32| {
+            let k2 = (0.5 * std::f64::consts::PI * f64::from(n) / LENGTH).powi(2);
+            let of = |modulus: f64| 2.0 * across / (LENGTH * k2 * (modulus * inertia * k2 - axial));
+            let soft = axial / MODULUS;
+            let rate = (1.0 - soft / (k2 * inertia - soft)) / DELAY;
+            let last = of(0.5 * MODULUS);
+            last + (of(MODULUS) - last) * (-rate * time).exp()
+        };
+        (0..50).map(|k| mode(2 * k + 1)).sum()
+    };
+    let matter = chained(Given { poisson: Some(0.0), ..of_modulus(MODULUS) }, &[(MODULUS, DELAY)])?;
+    let model = strip_of(matter, 20, &[-axial * DVec3::X, across * DVec3::Y])?;
+    let structure = System::new(&model)?;
+    let start = History { turned: true, ..structure.rest(0.0) };
+    let mut march = March::new(&structure, start, Drive::Loads, SETTINGS);
+    let mut checks = Vec::new();
+    for step in 0..=100 {
+        let time = 0.05 * DELAY * f64::from(step);
+        march.advance(time, 0.0, job, |_, _| Ok(()))?;
+        if [0, 20, 100].contains(&step) {
+            checks.push(within(
+                "second order",
+                format!("column under .3 of Euler's load that creeps: its end after {} τ, over that at once", step / 20),
+                end(&model, &march.history)?.y / exact(0.0),
+                exact(time) / exact(0.0),
+                0.01,
+            ));
+        }
+    }
+    Ok(checks)
 }
 
 /// A cantilever under a dead load P across its end, P L²/E I = 2 and 5: Mattiasson (1981).
@@ -193,7 +246,8 @@ mod tests {
 
     #[test]
     fn second_order_is_exact() {
-        let parts = [beam_column, elastica, buckled].map(|part| part(&Job::default()).unwrap());
+        let parts =
+            [beam_column, creeping, elastica, buckled].map(|part| part(&Job::default()).unwrap());
         for check in parts.concat() {
             println!("{} {} {}", check.name, check.value, check.expected);
             assert!(check.passed, "{check:?}");

@@ -17,7 +17,7 @@
 //!
 //! Other choices can be tried, for all at once: `EXPERIMENT_SIZES=.05,.025` (m),
 //! `EXPERIMENT_DIFFUSE=1` (one damage for all directions instead of cracks in planes: what had been
-//! declared at first; plots of its own), `EXPERIMENT_MEASURE=Mazars` or `Rankine`,
+//! declared at first; plots of its own),
 //! `EXPERIMENT_BOND=1` (bars slip by the CEB law, anchored at their ends),
 //! `EXPERIMENT_STRENGTH=mean` (f_ct from the mean strength of the cylinders, as if it were
 //! characteristic), `EXPERIMENT_TOLERANCE=.001`. The others write no plots. `EXPERIMENT_TALK=1`
@@ -35,6 +35,7 @@ mod band;
 mod column;
 mod flexure;
 mod interaction;
+mod membrane;
 mod panel;
 mod series;
 mod shear;
@@ -55,7 +56,6 @@ use intrados_mechanics::{
     material::{
         bond::Bond,
         concrete::{Code, Properties, tensile_strength},
-        damage::Measure,
         law::Cracks,
         steel::Bar,
     },
@@ -124,14 +124,9 @@ fn concrete(given: Given) -> Properties {
 
 /// A model of one concrete.
 fn model(mesh: Mesh, concrete: Properties) -> Model {
-    let measure = std::env::var("EXPERIMENT_MEASURE")
-        .ok()
-        .map(|name| if name == "Mazars" { Measure::Mazars } else { Measure::Rankine });
     let cracks = if std::env::var_os(DIFFUSE).is_some() { Cracks::Diffuse } else { Cracks::Planes };
-    let matter = Matter::Concrete(Box::new((
-        concrete,
-        Setting { measure, cracks, ..Setting::short_term(0.1) },
-    )));
+    let matter =
+        Matter::Concrete(Box::new((concrete, Setting { cracks, ..Setting::short_term(0.1) })));
     Model { mesh, bodies: vec![Body { matter, birth: f64::NEG_INFINITY }], ..Model::default() }
 }
 

@@ -95,7 +95,7 @@ pub(super) fn open(scene: &Scene, photo: Photographed, job: &Job) -> Result<Open
         let outline = member.and_then(|m| site.surface(m)).map(Surface::outline);
         let outline = outline.ok_or("this member has no surface of its own: choose another one")?;
         let picks = if photo.picks.exists() {
-            photographed::picks(&photo, scene, &site).map_err(|why| why.to_string())?
+            photographed::picks(&photo, &photograph, scene, &site).map_err(|why| why.to_string())?
         } else {
             Vec::new()
         };

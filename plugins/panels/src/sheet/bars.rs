@@ -61,15 +61,23 @@ pub(super) fn bars(ui: &mut Ui, predicted: &Predicted) {
 
 /// Damage that is foretold, zone by zone: of now on the left, of the end of the forecast on the
 /// right.
-pub(super) fn two(ui: &mut Ui, course: &Course) {
+pub(super) fn foretold(ui: &mut Ui, course: &Course) {
+    let name = format!("Forecast now and in {:.0} years", course.years);
+    two(ui, &name, [course.now.map(Some), course.later.map(Some)], ["now", "then"]);
+    ui.weak(format!("each zone by the forecast: left now, right in {:.0} years", course.years));
+}
+
+/// Damage zone by zone, of two predictions or times: one on the left, one on the right; nothing
+/// where it is unknown.
+pub(super) fn two(ui: &mut Ui, name: &str, sides: [[Option<f64>; ZONES]; 2], called: [&str; 2]) {
     let size = vec2(ui.available_width().min(420.0), 0.6 * HEIGHT);
     let (rect, response) = ui.allocate_exact_size(size, Sense::hover());
-    let name = format!("Forecast now and in {:.0} years", course.years);
-    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, &name));
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, name));
     ui.painter().rect_filled(rect, 1.0, ui.visuals().extreme_bg_color);
     let width = rect.width() / ZONES as f32;
     for zone in 0..ZONES {
-        for (side, damage) in [course.now[zone], course.later[zone]].into_iter().enumerate() {
+        for (side, damage) in sides.iter().map(|side| side[zone]).enumerate() {
+            let Some(damage) = damage else { continue };
             let left = rect.left() + width * (zone as f32 + 0.5 * side as f32) + 1.0;
             let high = rect.height() * damage.clamp(0.02, 1.0) as f32;
             let column = Rect::from_min_max(
@@ -82,8 +90,10 @@ pub(super) fn two(ui: &mut Ui, course: &Course) {
     }
     if let Some(at) = response.hover_pos() {
         let zone = (((at.x - rect.left()) / width) as usize).min(ZONES - 1);
-        let (now, later) = (course.now[zone], course.later[zone]);
-        response.on_hover_text(format!("{}: {now:.2} now, {later:.2} then", place(zone)));
+        let said = [0, 1].map(|side| match sides[side][zone] {
+            Some(damage) => format!("{damage:.2} {}", called[side]),
+            None => format!("unknown {}", called[side]),
+        });
+        response.on_hover_text(format!("{}: {}, {}", place(zone), said[0], said[1]));
     }
-    ui.weak(format!("each zone by the forecast: left now, right in {:.0} years", course.years));
 }

@@ -3,6 +3,7 @@
 
 mod bars;
 mod capacity;
+mod compare;
 mod evidence;
 mod faces;
 mod links;
@@ -19,6 +20,7 @@ use capacity::Mechanics;
 
 use crate::{
     Action, Actions, Latest, Selection, colours,
+    history::History,
     moment::Course,
     number::{copied, plus_minus},
 };
@@ -31,6 +33,7 @@ pub(crate) fn member(
     InMut(ui): InMut<Ui>,
     scene: Option<Res<CurrentScene>>,
     latest: Res<Latest>,
+    history: Res<History>,
     selection: Res<Selection>,
     mut mechanics: Mechanics,
     mut listing: ResMut<Listing>,
@@ -53,6 +56,9 @@ pub(crate) fn member(
     let told = result.and_then(|r| r.members.get(index));
     if let Some(predicted) = latest.member(index) {
         section(ui, "Damage along the member", |ui| bars::bars(ui, predicted));
+        if let Some(earlier) = history.beside() {
+            section(ui, "Compared", |ui| compare::compare(ui, member, predicted, earlier));
+        }
     }
     if let Some(told) = told {
         if !told.defects.is_empty() || !told.faces.is_empty() {
@@ -213,7 +219,7 @@ fn foretold(ui: &mut Ui, told: &MemberPrediction) {
         ui.label(format!(
             "In {years:.0} years it loses most in {zone} of the axis: d = {now:.2} becomes {later:.2}."
         ));
-        bars::two(ui, &course);
+        bars::foretold(ui, &course);
     }
     let rust = forecast.details.get("rust");
     let Some(rust) = rust else { return };

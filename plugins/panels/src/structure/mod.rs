@@ -20,6 +20,7 @@ pub(crate) use spot::Spot;
 use crate::{
     Action, Actions, Latest, Selection,
     attach::Form,
+    history::{Earlier, History},
     moment::{self, Moment, Seen},
 };
 
@@ -45,6 +46,8 @@ const SIDES: [(&str, Vec3); 3] = [
 #[derive(Resource)]
 pub(crate) struct Structure {
     model: model::Model,
+    /// The same as an earlier prediction has it, on its left.
+    earlier: model::Model,
     /// Whether members are named in the picture.
     names: bool,
     /// Where it is cut open.
@@ -58,7 +61,8 @@ impl Default for Structure {
     fn default() -> Self {
         let (model, tape) = (model::Model::default(), Tape::default());
         let moment = Moment::default();
-        Self { model, names: true, section: None, tape, wished: None, moment }
+        let earlier = model::Model::earlier();
+        Self { model, earlier, names: true, section: None, tape, wished: None, moment }
     }
 }
 
@@ -92,6 +96,7 @@ pub(crate) fn structure(
     InMut(ui): InMut<Ui>,
     scene: Option<Res<CurrentScene>>,
     latest: Res<Latest>,
+    mut history: ResMut<History>,
     selection: Res<Selection>,
     mut structure: ResMut<Structure>,
     mut form: ResMut<Form>,
@@ -99,11 +104,13 @@ pub(crate) fn structure(
 ) {
     let Some(scene) = scene else { return };
     let scene = &scene.0;
-    let rect = ui.available_rect_before_wrap();
+    let whole = ui.available_rect_before_wrap();
+    let history = history.bypass_change_detection();
     let structure = structure.bypass_change_detection();
     if let Some(view) = structure.wished.take() {
         let member = if view == View::Framed { selection.0 } else { None };
         structure.model.go(view, scene, member);
+        structure.model.camera().iter().for_each(|camera| structure.earlier.follow(camera));
     }
     let section = structure.section;
     // Of a prediction that is not there yet nothing is foretold.
@@ -111,6 +118,22 @@ pub(crate) fn structure(
     let when = if years.is_some() { structure.moment } else { Moment::Now };
     let seen = when.seen(scene, &latest);
     let scale = if when == Moment::Added { Scale::ADDED } else { Scale::DAMAGE };
+    let rect = match history.beside() {
+        None => whole,
+        Some(earlier) => {
+            let (left, right) = whole.split_left_right_at_fraction(0.5);
+            beside(
+                ui,
+                left.with_max_x(left.right() - 2.0),
+                structure,
+                earlier,
+                scene,
+                *selection,
+                &mut actions,
+            );
+            right
+        }
+    };
     let pointed = structure.model.show(ui, rect, scene, &seen, scale, *selection, section);
     let Some(pointed) = pointed else { return };
     if structure.names {
@@ -120,14 +143,48 @@ pub(crate) fn structure(
         };
         structure.model.names(ui, rect, scene, &value, *selection, &pointed.camera);
     }
+    structure.earlier.follow(&pointed.camera);
     compass::draw(ui, rect, &pointed.camera);
     structure.tape.draw(ui, rect, &pointed.camera);
     let shown = Shown { latest: &latest, seen: &seen, when, years };
     point(structure, scene, &shown, pointed, form.bypass_change_detection(), &mut actions);
-    let bar = Rect::from_min_size(rect.min + vec2(8.0, 8.0), vec2(rect.width() - 16.0, 24.0));
+    let bar = Rect::from_min_size(whole.min + vec2(8.0, 8.0), vec2(whole.width() - 16.0, 24.0));
     ui.scope_builder(egui::UiBuilder::new().max_rect(bar), |ui| {
-        ui.vertical(|ui| tools(ui, structure, *selection, years, &mut actions));
+        ui.vertical(|ui| tools(ui, structure, history, *selection, years, &mut actions));
     });
+}
+
+/// The structure as an earlier prediction has it, from the same side.
+fn beside(
+    ui: &mut Ui,
+    rect: Rect,
+    structure: &mut Structure,
+    earlier: &Earlier,
+    scene: &Arc<Scene>,
+    selection: Selection,
+    actions: &mut Actions,
+) {
+    let (seen, section) = (earlier.seen(scene), structure.section);
+    let shown = structure.earlier.show(ui, rect, scene, &seen, Scale::DAMAGE, selection, section);
+    let Some(pointed) = shown else { return };
+    structure.model.follow(&pointed.camera);
+    if structure.names {
+        let value = |i: usize| earlier.member(&scene.members[i].id)?.damage().map(|d| d.value);
+        structure.earlier.names(ui, rect, scene, &value, selection, &pointed.camera);
+    }
+    let font = egui::TextStyle::Body.resolve(ui.style());
+    let at = rect.left_bottom() + vec2(10.0, -28.0);
+    let ink = ui.visuals().strong_text_color();
+    ui.painter().with_clip_rect(rect).text(
+        at,
+        egui::Align2::LEFT_BOTTOM,
+        &earlier.title,
+        font,
+        ink,
+    );
+    if pointed.response.clicked() {
+        actions.ask(Action::Select(pointed.under.map(|spot| spot.member)));
+    }
 }
 
 /// What is shown, and when that is.
@@ -189,6 +246,7 @@ fn point(
 fn tools(
     ui: &mut Ui,
     structure: &mut Structure,
+    history: &mut History,
     selection: Selection,
     years: Option<f64>,
     actions: &mut Actions,
@@ -209,6 +267,7 @@ fn tools(
             if tape.on_hover_text(hint).changed() {
                 structure.tape.clear();
             }
+            compared(ui, history, actions);
         });
     });
     if let Some(years) = years {
@@ -228,6 +287,24 @@ fn tools(
             })
         });
     }
+}
+
+/// Which earlier prediction is looked at beside the newest.
+fn compared(ui: &mut Ui, history: &mut History, actions: &mut Actions) {
+    let mut chosen = history.chosen();
+    let button = ui.menu_button("Compare", |ui| {
+        ui.selectable_value(&mut chosen, None, "Nothing");
+        for (index, title) in history.titles().enumerate() {
+            ui.selectable_value(&mut chosen, Some(index), title);
+        }
+        ui.separator();
+        if ui.button("Open an earlier prediction…").clicked() {
+            actions.ask(Action::ChoosePrediction);
+        }
+    });
+    let hint = "An earlier prediction beside this one: of before a change, or the predict.json of another day";
+    button.response.on_hover_text(hint);
+    history.choose(chosen);
 }
 
 /// When it is looked at.

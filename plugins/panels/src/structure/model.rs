@@ -50,11 +50,22 @@ impl Scale {
     pub(super) const ADDED: Self = Self { name: "d is added", top: 0.4 };
 }
 
+/// What is shown of a structure.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+enum Of {
+    /// What is known of it.
+    #[default]
+    Now,
+    /// What was known of it at first.
+    Earlier,
+    /// Nothing is known of it: there is no scale of damage.
+    Bare,
+}
+
 /// What is remembered between frames.
 #[derive(Default)]
 pub(super) struct Model {
-    /// Nothing is known of it: there is no scale of damage.
-    is_bare: bool,
+    of_what: Of,
     /// Hash of the scene that the facets are of.
     of: String,
     facets: Arc<Vec<Facet>>,
@@ -95,7 +106,12 @@ pub(super) struct Pointed {
 impl Model {
     /// Of a structure of which nothing is known yet.
     pub(super) fn bare() -> Self {
-        Self { is_bare: true, ..Self::default() }
+        Self { of_what: Of::Bare, ..Self::default() }
+    }
+
+    /// Of what was known at first.
+    pub(super) fn earlier() -> Self {
+        Self { of_what: Of::Earlier, ..Self::default() }
     }
 
     /// Draws it into `rect`; none: there is nothing to be seen.
@@ -121,7 +137,11 @@ impl Model {
         let (width, height) = (rect.width().max(8.0) as u32, rect.height().max(8.0) as u32);
         let response = ui.allocate_rect(rect, Sense::click_and_drag());
         response.widget_info(|| {
-            let name = if self.is_bare { "Preview" } else { "Damage of members" };
+            let name = match self.of_what {
+                Of::Now => "Damage of members",
+                Of::Earlier => "Damage of members in an earlier prediction",
+                Of::Bare => "Preview",
+            };
             egui::WidgetInfo::labeled(egui::Role::Image, true, name)
         });
         let camera = match &self.camera {
@@ -136,7 +156,7 @@ impl Model {
         let shown = self.shown.as_ref()?;
         let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
         ui.painter().image(shown.texture.id(), rect, whole, Color32::WHITE);
-        if !self.is_bare {
+        if self.of_what == Of::Now {
             legend(ui, rect, scale);
         }
         ruler(ui, rect, &camera);
@@ -147,6 +167,16 @@ impl Model {
     /// The place on a member that is at a point of the window.
     pub(super) fn spot(&self, at: egui::Pos2) -> Option<Spot> {
         self.shown.as_ref()?.spot(at)
+    }
+
+    /// Where it is looked at from, once it was shown.
+    pub(super) fn camera(&self) -> Option<&Camera> {
+        self.camera.as_ref()
+    }
+
+    /// Looks from where another picture of the same structure is looked at from.
+    pub(super) fn follow(&mut self, camera: &Camera) {
+        self.camera = Some(camera.clone());
     }
 
     /// Corners of the box around the structure.
@@ -164,8 +194,8 @@ impl Model {
         let is_alike = !positions.is_empty() && bounds(&positions) == bounds(&self.positions);
         let camera = self.camera.take().filter(|_| is_alike);
         let facets = Arc::new(facets);
-        let (of, is_bare) = (scene.hash.clone(), self.is_bare);
-        *self = Self { is_bare, of, facets, positions, camera, shown: None };
+        let (of, of_what) = (scene.hash.clone(), self.of_what);
+        *self = Self { of_what, of, facets, positions, camera, shown: None };
     }
 
     /// Looks from another place, so that what is wanted fills the picture.
