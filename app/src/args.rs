@@ -1072,7 +1072,8 @@ pub(crate) struct Photo {
     /// Photographs: JPEG, PNG or TIFF
     #[arg(value_name = "FILE")]
     pub(crate) files: Vec<PathBuf>,
-    /// Table of picks: which place is where in which photograph
+    /// Table of picks: which place is where in which photograph, or which printed AprilTag (36h11)
+    /// was stuck where on a member
     #[arg(long, value_name = "PICKS.csv")]
     pub(crate) pose: Option<PathBuf>,
     /// Print the numbered corners of this member, and nothing else

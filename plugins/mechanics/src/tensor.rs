@@ -282,20 +282,21 @@ pub fn cylindrical(point: [f64; 3], origin: [f64; 3], axis: [f64; 3]) -> Frame {
 /// An equivalent strain and its derivative by the strain.
 pub(crate) type Equivalent = (f64, Voigt);
 
-/// The least principal stress, without directions: the least root of the characteristic polynomial
-/// by the angle of its three real ones (Smith 1961); exact to the square root of rounding.
+/// The largest and the least principal stress, without directions: roots of the characteristic
+/// polynomial by the angle of its three real ones (Smith 1961); exact to the square root of
+/// rounding.
 #[must_use]
-pub(crate) fn least_principal(s: &Voigt) -> f64 {
+pub(crate) fn extreme_principals(s: &Voigt) -> [f64; 2] {
     let mean = i1(s) / 3.0;
     let [a, b, c] = [s[0] - mean, s[1] - mean, s[2] - mean];
     let [xy, yz, zx] = [s[3], s[4], s[5]];
     let size = ((a * a + b * b + c * c) / 6.0 + (xy * xy + yz * yz + zx * zx) / 3.0).sqrt();
     if size <= 0.0 {
-        return mean;
+        return [mean; 2];
     }
     let det = a * (b * c - yz * yz) - xy * (xy * c - yz * zx) + zx * (xy * yz - b * zx);
     let angle = (0.5 * det / size.powi(3)).clamp(-1.0, 1.0).acos() / 3.0;
-    mean + 2.0 * size * (angle + 2.0 * std::f64::consts::FRAC_PI_3).cos()
+    [0.0, 2.0].map(|k| mean + 2.0 * size * (angle + k * std::f64::consts::FRAC_PI_3).cos())
 }
 
 /// Modified von Mises equivalent strain (de Vree, Brekelmans and van Gils 1995) with `k` = f_c/f_t:
@@ -330,14 +331,14 @@ pub(crate) mod tests {
         for walk in 0..1000 {
             let stress = random(walk, 1e7);
             let least = Principal::of_stress(&stress).values[2];
-            assert!((least_principal(&stress) - least).abs() < 1e-6, "{stress:?}");
+            assert!((extreme_principals(&stress)[1] - least).abs() < 1e-6, "{stress:?}");
         }
         for (stress, least) in [
             ([-3.0, -3.0, -3.0, 0.0, 0.0, 0.0], -3.0),
             ([1.0, 1.0, -2.0, 0.0, 0.0, 0.0], -2.0),
             ([5.0, -1.0, -1.0, 0.0, 0.0, 0.0], -1.0),
         ] {
-            assert!((least_principal(&stress) - least).abs() < 1e-7, "{stress:?}");
+            assert!((extreme_principals(&stress)[1] - least).abs() < 1e-7, "{stress:?}");
         }
     }
 

@@ -32,8 +32,8 @@ use super::{
         radiograph::{SLICES, VIEWS},
     },
     words::{
-        NOTHING, bad_probability, due, files, finding, level, many, matters, metres, plus_minus,
-        within, word, worse_half,
+        NOTHING, UNTOLD, bad_probability, due, files, finding, level, many, matters, metres,
+        plus_minus, within, word, worse_half,
     },
 };
 
@@ -214,8 +214,11 @@ impl<'a> Page<'a> {
                 .worst_zone
                 .map_or_else(|| NOTHING.into(), |zone| format!("{} of its length", place(zone))),
             damage: self.damage(m),
-            probability: format!("{:.0} %", 100.0 * likely(m)),
-            action: &m.advice,
+            probability: match m.damage {
+                Some(_) => format!("{:.0} %", 100.0 * likely(m)),
+                None => NOTHING.into(),
+            },
+            action: if m.damage.is_some() { &m.advice } else { UNTOLD },
             when: self.due(m),
         };
         members.into_iter().map(one).collect()

@@ -12,6 +12,10 @@ use crate::basis;
 /// Where there is nothing to say.
 pub(crate) const NOTHING: &str = "–";
 
+/// What is to be done about a member of which things were found that say nothing of its strength.
+pub(crate) const UNTOLD: &str =
+    "Look at it closely: what was found there does not tell what it has lost.";
+
 /// Damage by a forecast, less than which is worth no line of its own.
 const LITTLE: f64 = 0.02;
 

@@ -19,7 +19,7 @@ const SEEN: &str = r#"(
 )"#;
 
 /// A window with a column, and what has been seen of it.
-fn with_seen() -> (Window, tempfile::TempDir) {
+pub(super) fn with_seen() -> (Window, tempfile::TempDir) {
     let folder = tempfile::tempdir().expect("a folder for the scene");
     let file = folder.path().join("lonely.ron");
     fs::write(&file, LONELY).expect("written");
@@ -180,4 +180,48 @@ impl Window {
         }
         panic!("{text} was not said");
     }
+}
+
+/// What `intrados predict` wrote a year ago.
+const EARLIER: &str = r#"{"schema": "intrados.predict/2", "scene": "lonely", "members": [
+    {"id": "C1", "name": "Column 1", "damage": 0.02, "damage_std_error": 0.01, "state": "sound",
+     "zones": [{"value": 0.02, "std_error": 0.01}, null, null, null, null, null, null, null, null, null]}]}"#;
+
+/// An earlier prediction is looked at beside the newest, on the member's sheet too; and what was
+/// said before a finding came is one.
+#[test]
+fn an_earlier_prediction_is_compared_with_the_newest() {
+    let (mut window, folder) = with_seen();
+    window.until("the prediction", |w| {
+        w.get_resource::<Latest>().is_some_and(|l| l.result.is_some())
+    });
+    window.ask(Action::Select(Some(0)));
+    window.frames(2);
+    let beside = "Damage of members in an earlier prediction";
+    assert!(!has(&window, beside) && !has(&window, "then: d ="));
+    let file = folder.path().join("predict.json");
+    fs::write(&file, EARLIER).expect("written");
+    window.ask(Action::Compare(file.clone()));
+    window.frames(3);
+    assert!(has(&window, beside) && has(&window, "then: d = 0.020 ± 0.010, sound"));
+    let both = ["Damage of members", beside].map(|n| window.harness.get_by_label(n).rect());
+    assert!(both[1].right() <= both[0].left(), "one beside the other: {both:?}");
+    fs::write(&file, EARLIER.replace("C1", "Q1")).expect("written");
+    window.ask(Action::Compare(file));
+    window.frames(3);
+    assert!(has(&window, "another structure"));
+
+    window.click("Attach evidence…");
+    window.until_seen("Fill in its width, mm.");
+    type_into(&mut window, "width, mm", "0.9");
+    type_into(&mut window, "Date", "2026-06-03");
+    window.click("Attach");
+    window.until("the prediction with it", |w| {
+        w.resource::<CurrentScene>().0.structure.observations.len() == 2
+            && w.resource::<Latest>().result.is_some()
+    });
+    window.frames(2);
+    window.click("Compare");
+    window.until_seen("Open an earlier prediction…");
+    assert!(has(&window, "Prediction 1, "));
 }

@@ -2,6 +2,8 @@
 
 mod forms;
 mod journey;
+mod painter;
+mod pictures;
 mod tools;
 
 use std::{cell::RefCell, path::Path, rc::Rc, time::Duration};
@@ -38,11 +40,13 @@ use intrados_xray::{
     plugin::{Scans, StopScan, TakeScan},
     scan::Corrections,
 };
+use painter::Painter;
 
 /// A window and the world in it.
 struct Window {
     app: Rc<RefCell<App>>,
     harness: Harness<'static>,
+    painter: Painter,
 }
 
 /// Frames that are waited at most, each a hundredth of a second or more: only what never comes ends
@@ -73,11 +77,21 @@ impl Window {
         app.cleanup();
         let app = Rc::new(RefCell::new(app));
         let theirs = Rc::clone(&app);
+        let painter = Painter::default();
         let harness = Harness::builder()
             .with_size([1280.0, 800.0])
             .with_max_steps(64)
+            .renderer(painter.clone())
             .build_ui(move |ui| show(ui, theirs.borrow_mut().world_mut()));
-        Self { app, harness }
+        Self { app, harness, painter }
+    }
+
+    /// What is seen.
+    fn picture(&self) -> image::RgbImage {
+        let output = self.harness.output();
+        let scale = output.pixels_per_point;
+        let primitives = self.harness.ctx.tessellate(output.shapes.clone(), scale);
+        self.painter.paint(&primitives, [1280, 800])
     }
 
     /// As the desktop does: the world, then the window.

@@ -18,9 +18,12 @@
 //! the crack is shut, and slide at the limit of Vecchio and Collins and μ times what presses them
 //! (`Faces`).
 //!
-//! The law's equivalent strain judges stress on what is left of the planes, σᵢ/(1 − dᵢ) and τᵢⱼ, and
-//! each plane is asked for its share of that equivalent strain, by its tension over the largest. In
-//! a first crack under any steady stress that is what one damage for all directions does.
+//! The largest tension is judged, that of what is left of the planes, σᵢ/(1 − dᵢ) and τᵢⱼ, and larger
+//! the more presses across it (`tensile`); each plane is asked for its share of that, by its tension
+//! over the largest. (One damage for all directions is driven by the modified von Mises strain, by
+//! which pure shear cracks at √(k/3), some 1.9 of the tensile strength.)
+//! Bars keep cracks apart: within a brick there are as many as their bond makes, each with its own
+//! energy and width ([`Step::bars`]).
 //! Compression is crushed by the part of the stress that presses: σ = σ⁺ + (1 − d_c) σ⁻ (Faria,
 //! Oliver and Cervera 1998). Cracks that are open across it weaken it (Vecchio and Collins 1986, see
 //! `softened`). Creep is driven by the stress before crushing.
@@ -50,6 +53,9 @@ pub struct Planes {
 
 /// Friction of rough concrete on concrete (EN 1992-1-1 §6.2.5).
 const FRICTION: f64 = 0.7;
+/// Share of the tensile strength that compression as strong as f_c takes across (Kupfer, Hilsdorf
+/// and Rüsch 1969; CEB 1993, 2.1.5.3).
+const ACROSS: f64 = 0.8;
 
 /// Largest grain of the aggregate, mm: the usual one, for sources seldom tell it.
 const GRAIN: f64 = 16.0;
@@ -287,6 +293,15 @@ fn crushed(principal: &Principal, tangent: &Tangent, damage: f64) -> (Voigt, Tan
     (stress.as_stress(), tensor::rotate_tangent(&local, &principal.directions))
 }
 
+/// The tensile stress that harms alone as much as this stress, Pa: compression across weakens
+/// concrete in proportion, σ₁ = f_ct (1 − .8 σ₃⁻/f_c) (Kupfer, Hilsdorf and Rüsch 1969).
+fn tensile(stress: &Voigt, fcm: f64) -> f64 {
+    let [most, least] = tensor::extreme_principals(stress);
+    let left = 1.0 + ACROSS * least.min(0.0) / fcm.max(1.0);
+    // Where hardly anything is left it is crushed, which is told elsewhere.
+    most.max(0.0) / left.max(0.1)
+}
+
 /// Strength along a direction over that of concrete without cracks: β = 1/(.8 + .34 ε₁/.002), at
 /// most 1 (Vecchio and Collins 1986, eq. 22, with the strain of .002 at the peak of their panels),
 /// ε₁ being how far cracks are open across it. Strength and the strain at it both count β times, as
@@ -348,7 +363,7 @@ impl Concrete {
         }
         let before = &state.planes;
         let axes = before.turned(&effective);
-        let bands = axes.map(|n| self.along(&n, step));
+        let bands = axes.map(|n| self.along(&n, step).min(step.spacing(&n)));
         let laws = bands.map(|band| {
             Knee::of(self.elastic.modulus, clock.aged.fctm, self.properties.fracture_energy, band)
         });
@@ -419,7 +434,8 @@ impl Concrete {
         let delayed = tensor::scale(&tensor::sub(&drive, &state.drive), clock.increment.delayed);
         let creep = tensor::add(&tensor::add(&state.creep, past), &delayed);
         let share = tensor::scale(&creep, self.setting.creep_share);
-        let (asked, _) = self.equivalent(&tensor::add(&section, &share));
+        let harms = tensor::apply(&hooke, &tensor::add(&section, &share));
+        let asked = tensile(&harms, clock.aged.fcm) / e;
         let share = tensor::von_mises(&tensor::apply(&hooke, &share));
         // A strain that is not finite is for the whole law to tell.
         if !(asked <= bears && clock.is_harmless(tensor::von_mises(&stress) + share)) {
@@ -440,7 +456,7 @@ impl Concrete {
                 thermal: clock.thermal,
                 shrinkage: clock.shrinkage,
                 maturity: clock.maturity,
-                utilisation: -tensor::least_principal(&stress).min(0.0) / clock.aged.fck,
+                utilisation: -tensor::extreme_principals(&stress)[1].min(0.0) / clock.aged.fck,
                 planes: Planes { asked: [asked, 0.0, 0.0], ..SOUND },
                 ..*state
             },
@@ -481,11 +497,7 @@ impl Concrete {
         );
         let judged = tensor::add(&cracked.section, &tensor::rotate_stress(&share, axes));
         let most = judged[..3].iter().fold(0.0, |m: f64, s| m.max(*s));
-        let (value, _) = if most > 0.0 {
-            self.equivalent(&tensor::apply(&tensor::compliance(e, nu), &judged))
-        } else {
-            (0.0, ZERO)
-        };
+        let value = if most > 0.0 { tensile(&judged, clock.aged.fcm) / e } else { 0.0 };
         let asked =
             std::array::from_fn(
                 |i| if most > 0.0 { value * judged[i].max(0.0) / most } else { 0.0 },
@@ -584,7 +596,8 @@ mod tests {
 
     const E: f64 = 30e9;
     const NU: f64 = 0.2;
-    const NOW: Step = Step { from: 0.0, to: 0.0, temperature: [293.15; 2], edges: None };
+    const NOW: Step =
+        Step { from: 0.0, to: 0.0, temperature: [293.15; 2], edges: None, bars: [0.0; 3] };
 
     fn c30() -> Properties {
         Given { code: Code::Ec2, ..Given::from("C30/37".parse::<Class>().unwrap()) }

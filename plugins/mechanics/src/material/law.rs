@@ -153,6 +153,8 @@ pub struct Step {
     /// Edges of the element, m: the columns of twice its mean Jacobian. None: a size whatever the
     /// direction, [`Setting::size`].
     pub edges: Option<Edges>,
+    /// How many cracks a metre bars keep apart, along each axis, 1/m; 0 without bars.
+    pub bars: [f64; 3],
 }
 
 /// Three edges of a parallelepiped, m.
@@ -168,11 +170,18 @@ pub fn reach(edges: &Edges, n: &[f64; 3]) -> f64 {
 }
 
 impl Step {
+    /// How far apart bars keep the cracks that open along a unit direction, m; infinite without
+    /// bars. Of bars two ways |cos θ|/s₁ + |sin θ|/s₂ (Vecchio and Collins 1986).
+    #[must_use]
+    pub(super) fn spacing(&self, n: &[f64; 3]) -> f64 {
+        1.0 / n.iter().zip(self.bars).map(|(n, bars)| n.abs() * bars).sum::<f64>()
+    }
+
     /// A step at 20 °C.
     #[must_use]
     #[cfg(test)]
     pub(crate) fn between(from: f64, to: f64) -> Self {
-        Self { from, to, temperature: [293.15; 2], edges: None }
+        Self { from, to, temperature: [293.15; 2], edges: None, bars: [0.0; 3] }
     }
 }
 
@@ -231,8 +240,8 @@ impl Concrete {
         Ok(Self { properties, setting, chain, elastic })
     }
 
-    /// The strain of tension that harms as much as this one: the modified von Mises strain with k =
-    /// f_c/f_t, and its derivative.
+    /// The strain of tension that harms as much as this one, for one damage of all directions: the
+    /// modified von Mises strain with k = f_c/f_t, and its derivative.
     #[must_use]
     pub(super) fn equivalent(&self, strain: &Voigt) -> Equivalent {
         let Properties { fcm, fctm, .. } = self.properties;
@@ -606,7 +615,8 @@ mod tests {
         Concrete::new(p, Setting::long_term(0.05, creep)).unwrap()
     }
 
-    const NOW: Step = Step { from: 0.0, to: 0.0, temperature: [293.15; 2], edges: None };
+    const NOW: Step =
+        Step { from: 0.0, to: 0.0, temperature: [293.15; 2], edges: None, bars: [0.0; 3] };
 
     /// The strain at which the stress along x is `stress` and nothing else acts; none if no
     /// equilibrium is found.
@@ -876,7 +886,13 @@ mod tests {
     fn heat_and_birth() {
         let law = short(0.05);
         let p = law.properties();
-        let step = Step { from: 0.0, to: 3600.0, temperature: [293.15, 313.15], edges: None };
+        let step = Step {
+            from: 0.0,
+            to: 3600.0,
+            temperature: [293.15, 313.15],
+            edges: None,
+            bars: [0.0; 3],
+        };
         let free =
             law.respond(&tensor::isotropic(p.expansion * 20.0), &law.born(0.0, 28.0 * DAY), &step);
         assert!(largest(&free.stress) < 1e-3);
@@ -921,6 +937,7 @@ mod tests {
                     to,
                     temperature: [283.0 + f64::from(k % 20), 284.0 + f64::from(k % 20)],
                     edges: None,
+                    bars: [0.0; 3],
                 };
                 let answer = law.respond(&strain, &state, &step);
                 assert!(

@@ -140,6 +140,8 @@ pub(super) struct Moment {
     pub(super) neutral: f64,
     /// Edges of the brick, m.
     pub(super) edges: Edges,
+    /// Cracks that its bars keep apart, along each axis, 1/m.
+    pub(super) bars: [f64; 3],
     /// Of the excess of the last equilibrium so much becomes damage of tension, whatever the strain
     /// is now; none: damage is found.
     pub(super) growth: Option<f64>,
@@ -266,6 +268,7 @@ impl Law {
                     to: moment.span[1],
                     temperature: moment.temperature,
                     edges: Some(moment.edges),
+                    bars: moment.bars,
                 };
                 let grown = moment
                     .growth
