@@ -11,7 +11,7 @@ use nalgebra::SVector;
 use rayon::prelude::*;
 
 use crate::{
-    Located, Photograph, Pick, Pose, Site,
+    Located, Photograph, Pick, Pose, PoseError, Prior, Site, locate,
     pose::{ByEdges, Covariance, UNKNOWNS, inverse},
 };
 
@@ -74,6 +74,23 @@ struct Balance {
     off_px: f64,
     /// χ² of the edges over its degrees of freedom.
     misfit: f64,
+}
+
+impl Site {
+    /// Where a photograph was taken from: by its picks, and then by the edges of the model that it
+    /// shows.
+    ///
+    /// # Errors
+    /// [`PoseError`], of the picks.
+    pub fn locate(
+        &self,
+        photograph: &Photograph,
+        picks: &[Pick],
+        prior: &Prior,
+    ) -> Result<Located, PoseError> {
+        let picked = locate(picks, prior, &|pose| self.admits(pose, picks))?;
+        Ok(by_edges(picked, photograph, self, picks))
+    }
 }
 
 /// The pose that draws the members' edges where the photograph shows them, the picks counting by

@@ -11,9 +11,8 @@ use intrados_scene::{
 use intrados_stage::{Cancelled, Job};
 
 use crate::{
-    Located, Photograph, Pick, Pose, PoseError, Prior, by_edges,
+    Located, Pick, Pose,
     face::{Face, Surface, normal},
-    locate,
     pose::{Covariance, UNKNOWNS},
 };
 
@@ -147,24 +146,9 @@ impl Site {
         self.surfaces.get(member)?.as_ref()
     }
 
-    /// Where a photograph was taken from: by its picks, and then by the edges of the model that it
-    /// shows.
-    ///
-    /// # Errors
-    /// [`PoseError`], of the picks.
-    pub fn locate(
-        &self,
-        photograph: &Photograph,
-        picks: &[Pick],
-        prior: &Prior,
-    ) -> Result<Located, PoseError> {
-        let picked = locate(picks, prior, &|pose| self.admits(pose, picks))?;
-        Ok(by_edges(picked, photograph, self, picks))
-    }
-
     /// Whether a camera there sees the places that were picked in its picture, and not through
     /// something: three quarters of them, since models are not exact. Pass it to
-    /// [`locate`].
+    /// [`locate`](crate::locate).
     #[must_use]
     pub fn admits(&self, pose: &Pose, picks: &[Pick]) -> bool {
         let rays: Vec<Ray> = picks
