@@ -76,7 +76,12 @@ fn every_tab_and_dialog_looks_as_it_did() {
     let (mut window, _folder) = at_rest();
     for (theme, called) in [(ThemePreference::Light, "light"), (ThemePreference::Dark, "dark")] {
         let mut shot = |window: &mut Window, name: &str| {
-            compare(&format!("{name}-{called}"), &settled(window), &mut wrong);
+            let mut picture = settled(window);
+            if name == "expert" {
+                // Below are plots over the CPU time that was taken.
+                picture = image::imageops::crop_imm(&picture, 0, 0, 640, 278).to_image();
+            }
+            compare(&format!("{name}-{called}"), &picture, &mut wrong);
         };
         start.ask(Action::Theme(theme));
         shot(&mut start, "start");
