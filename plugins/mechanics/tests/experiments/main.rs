@@ -8,7 +8,8 @@
 //!
 //! * strengths, moduli and dimensions from the source; what it does not measure by MC2010 from f_c,
 //!   printed;
-//! * modified von Mises strain with k = f_c/f_t; softening over the band that a crack has in its
+//! * cracks by the largest tension, which compression across helps (Kupfer; for one damage the
+//!   modified von Mises strain with k = f_c/f_t); softening over the band that a crack has in its
 //!   brick, by MC2010's two lines for cracks that know directions (the law of members), exponential
 //!   for one damage;
 //! * bars of 200 GPa, hardening E/100, bonded without slip;
