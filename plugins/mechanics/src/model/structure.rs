@@ -787,13 +787,12 @@ impl<'m> System<'m> {
     }
 }
 
-/// How many cracks a metre the bonded bars of each brick keep apart, along each axis: 5.4 ρ/φ, since
+/// How many cracks a metre the bars of each brick keep apart, along each axis: 5.4 ρ/φ, since
 /// bond of 1.8 f_ct along l hands a crack's tension to the concrete beside it, ρ 4 · 1.8 l/φ = 1,
 /// and cracks lie 2 l apart at most, two thirds of that in the mean (MC2010, 7.6.4.4, without cover).
 fn crossed(model: &Model) -> Vec<[f64; 3]> {
     let mut cracks = vec![[0.0; 3]; model.mesh.hexes.len()];
-    let bonded = |s: &&super::Steel| s.bond.is_none() && matches!(s.kind, super::SteelKind::Bar(_));
-    for steel in model.steel.iter().filter(bonded) {
+    for steel in model.steel.iter().filter(|s| matches!(s.kind, super::SteelKind::Bar(_))) {
         let diameter = (4.0 * steel.area / std::f64::consts::PI).sqrt();
         for piece in &steel.pieces {
             let volume = model.mesh.hex_volume(piece.host as u32);
