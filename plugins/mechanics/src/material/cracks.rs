@@ -294,7 +294,8 @@ fn crushed(principal: &Principal, tangent: &Tangent, damage: f64) -> (Voigt, Tan
 }
 
 /// The tensile stress that harms alone as much as this stress, Pa: compression across weakens
-/// concrete in proportion, σ₁ = f_ct (1 − .8 σ₃⁻/f_c) (Kupfer, Hilsdorf and Rüsch 1969).
+/// concrete in proportion, σ₁ = f_ct (1 − .8 σ₃⁻/f_c) (Kupfer, Hilsdorf and Rüsch 1969). Of young
+/// concrete, too, f_c is that of 28 days: fresh, it would crack beside any load.
 fn tensile(stress: &Voigt, fcm: f64) -> f64 {
     let [most, least] = tensor::extreme_principals(stress);
     let left = 1.0 + ACROSS * least.min(0.0) / fcm.max(1.0);
@@ -435,7 +436,7 @@ impl Concrete {
         let creep = tensor::add(&tensor::add(&state.creep, past), &delayed);
         let share = tensor::scale(&creep, self.setting.creep_share);
         let harms = tensor::apply(&hooke, &tensor::add(&section, &share));
-        let asked = tensile(&harms, clock.aged.fcm) / e;
+        let asked = tensile(&harms, self.properties.fcm) / e;
         let share = tensor::von_mises(&tensor::apply(&hooke, &share));
         // A strain that is not finite is for the whole law to tell.
         if !(asked <= bears && clock.is_harmless(tensor::von_mises(&stress) + share)) {
@@ -497,7 +498,7 @@ impl Concrete {
         );
         let judged = tensor::add(&cracked.section, &tensor::rotate_stress(&share, axes));
         let most = judged[..3].iter().fold(0.0, |m: f64, s| m.max(*s));
-        let value = if most > 0.0 { tensile(&judged, clock.aged.fcm) / e } else { 0.0 };
+        let value = if most > 0.0 { tensile(&judged, self.properties.fcm) / e } else { 0.0 };
         let asked =
             std::array::from_fn(
                 |i| if most > 0.0 { value * judged[i].max(0.0) / most } else { 0.0 },
