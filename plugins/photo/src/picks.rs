@@ -129,67 +129,87 @@ fn parse(bytes: &[u8], scene: &Scene, site: &Site) -> Result<Picks, Fault> {
         let all = COLUMNS.join(", ");
         return Err((Some(1), format!("column {name:?} is not known: the columns are {all}")));
     }
-    let column = |name: &str| head.iter().position(|h| h.trim_start_matches('\u{feff}') == name);
     let mut picks = Picks::default();
-    for row in reader.records() {
-        let row = row.map_err(said)?;
-        let line = row.position().map(csv::Position::line);
-        let cell = |name: &str| column(name).and_then(|k| row.get(k)).filter(|c| !c.is_empty());
-        let number_of = |name: &str| -> Result<f64, Fault> {
-            let text = cell(name).ok_or((line, format!("{name} is missing")))?;
-            let value = text.parse::<f64>().ok().filter(|x| x.is_finite());
-            value.ok_or((line, format!("{name} {text:?} is no number")))
+    for cells in reader.records() {
+        let cells = cells.map_err(said)?;
+        let line = cells.position().map(csv::Position::line);
+        let row = Row { head: &head, cells: &cells };
+        let put = match row.cell("tag") {
+            Some(tag) => row.tag(tag, scene, site).and_then(|tag| picks.place(tag)),
+            None => row.pick(scene, site).map(|pick| picks.picked.push(pick)),
         };
-        let photo = cell("photo").map(str::to_owned);
-        if let Some(tag) = cell("tag") {
-            if let Some(name) =
-                ["u", "v", "x", "y", "z", "corner"].into_iter().find(|n| cell(n).is_some())
-            {
-                let what = format!(
-                    "a tag has no {name}: the photograph says where it is, and member, face, along, across_mm where it was stuck"
-                );
-                return Err((line, what));
-            }
-            let number = tag.parse().ok().filter(|number| *number < TAGS);
-            let none = || {
-                format!(
-                    "tag {tag:?} is none of the family 36h11: give its number, 0 to {}",
-                    TAGS - 1
-                )
-            };
-            let number = number.ok_or_else(|| (line, none()))?;
-            let or_0 = |name: &str| if cell(name).is_some() { number_of(name) } else { Ok(0.0) };
-            let at = Stuck {
-                member: cell("member").unwrap_or_default(),
-                face: cell("face").unwrap_or_default(),
-                along: number_of("along")?,
-                across_mm: or_0("across_mm")?,
-                turn_deg: or_0("turn_deg")?,
-                size_mm: number_of("size_mm")?,
-            };
-            let corners = at.corners(scene, site).map_err(|what| (line, what))?;
-            if picks.tags.iter().any(|t| {
-                t.number == number && (t.photo == photo || t.photo.is_none() || photo.is_none())
-            }) {
-                return Err((line, format!("tag {number} is placed twice: print every one once")));
-            }
-            picks.tags.push(TagAt { photo, number, corners });
-            continue;
-        }
-        let place = match (cell("member"), cell("corner")) {
-            (Some(member), Some(corner)) if cell("x").is_none() => {
-                named(member, corner, scene, site).map_err(|what| (line, what))?
-            }
-            (None, None) => DVec3::new(number_of("x")?, number_of("y")?, number_of("z")?),
-            _ => {
-                let what = "give either x, y, z or member, corner";
-                return Err((line, what.into()));
-            }
-        };
-        let pick = Pick { pixel: [number_of("u")?, number_of("v")?], place };
-        picks.picked.push(PickedIn { photo, pick });
+        put.map_err(|what| (line, what))?;
     }
     Ok(picks)
+}
+
+impl Picks {
+    fn place(&mut self, tag: TagAt) -> Result<(), String> {
+        let of_one = |a: &Option<String>, b: &Option<String>| a == b || a.is_none() || b.is_none();
+        let is_it = |t: &TagAt| t.number == tag.number && of_one(&t.photo, &tag.photo);
+        if self.tags.iter().any(is_it) {
+            return Err(format!("tag {} is placed twice: print every one once", tag.number));
+        }
+        self.tags.push(tag);
+        Ok(())
+    }
+}
+
+/// A row of a table.
+struct Row<'a> {
+    head: &'a csv::StringRecord,
+    cells: &'a csv::StringRecord,
+}
+
+impl Row<'_> {
+    fn cell(&self, name: &str) -> Option<&str> {
+        let column = self.head.iter().position(|h| h.trim_start_matches('\u{feff}') == name)?;
+        self.cells.get(column).filter(|cell| !cell.is_empty())
+    }
+
+    fn number(&self, name: &str) -> Result<f64, String> {
+        let text = self.cell(name).ok_or_else(|| format!("{name} is missing"))?;
+        let value = text.parse::<f64>().ok().filter(|x| x.is_finite());
+        value.ok_or_else(|| format!("{name} {text:?} is no number"))
+    }
+
+    fn photo(&self) -> Option<String> {
+        self.cell("photo").map(str::to_owned)
+    }
+
+    fn pick(&self, scene: &Scene, site: &Site) -> Result<PickedIn, String> {
+        let place = match (self.cell("member"), self.cell("corner")) {
+            (Some(member), Some(corner)) if self.cell("x").is_none() => {
+                named(member, corner, scene, site)?
+            }
+            (None, None) => DVec3::new(self.number("x")?, self.number("y")?, self.number("z")?),
+            _ => return Err("give either x, y, z or member, corner".into()),
+        };
+        let pixel = [self.number("u")?, self.number("v")?];
+        Ok(PickedIn { photo: self.photo(), pick: Pick { pixel, place } })
+    }
+
+    fn tag(&self, tag: &str, scene: &Scene, site: &Site) -> Result<TagAt, String> {
+        let others = ["u", "v", "x", "y", "z", "corner"];
+        if let Some(name) = others.into_iter().find(|name| self.cell(name).is_some()) {
+            return Err(format!(
+                "a tag has no {name}: the photograph says where it is, and member, face, along, across_mm where it was stuck"
+            ));
+        }
+        let number = tag.parse().ok().filter(|number| *number < TAGS).ok_or_else(|| {
+            format!("tag {tag:?} is none of the family 36h11: give its number, 0 to {}", TAGS - 1)
+        })?;
+        let or_0 = |name: &str| self.cell(name).map_or(Ok(0.0), |_| self.number(name));
+        let stuck = Stuck {
+            member: self.cell("member").unwrap_or_default(),
+            face: self.cell("face").unwrap_or_default(),
+            along: self.number("along")?,
+            across_mm: or_0("across_mm")?,
+            turn_deg: or_0("turn_deg")?,
+            size_mm: self.number("size_mm")?,
+        };
+        Ok(TagAt { photo: self.photo(), number, corners: stuck.corners(scene, site)? })
+    }
 }
 
 /// A member's surface by its id or name.
