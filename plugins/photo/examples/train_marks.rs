@@ -1,5 +1,5 @@
 //! Trains the network that reads damage on the lessons of a folder (see the example `lessons`):
-//! `cargo run --release -p intrados-photo --example train -- RECIPE.ron LESSONS OUT.f32`.
+//! `cargo run --release -p intrados-photo --example train_marks -- RECIPE.ron LESSONS OUT.f32`.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "an example for people")]
 
