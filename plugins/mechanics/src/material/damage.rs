@@ -35,8 +35,8 @@ pub(crate) struct Split {
     /// Strain of elasticity and damage, without the creep of the step.
     pub mechanical: [f64; 3],
     /// Strain of the undamaged material under the stress on what is left of the section, C⁻¹ σᵢ/(1
-    /// − dᵢ): what the equivalent strain judges. (The mechanical strain itself would not do: an open crack
-    /// does not contract its flanks, which it would take for more tension.)
+    /// − dᵢ): what the equivalent strain judges. (The mechanical strain itself would not do: an open
+    /// crack does not contract its flanks, which it would take for more tension.)
     pub effective: [f64; 3],
     /// What drives creep: C_ν σ with compression counted on what is left of the section, σ/(1 −
     /// d_c), Pa.

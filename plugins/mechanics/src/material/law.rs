@@ -13,7 +13,8 @@
 //! f_cm for a century and fail under .8 f_cm after two months; MC2010 (5.1-53) puts the limit at
 //! .78.
 //!
-//! Tension is compared by the modified von Mises strain (of the elastic strain under that stress); compression with
+//! Tension is compared by the modified von Mises strain (of the elastic strain under that stress;
+//! planes that know directions by [`super::cracks`]' own measure); compression with
 //! Lubliner's criterion of the compressive principal stresses on the section, (√(3J₂) − α I₁ − γ
 //! s_min)/((1 − α) E), α = .121 (biaxial strength 1.16 f_c), γ = 2.25 (K_c = .7: confinement p
 //! raises the strength by 4.0 p).
