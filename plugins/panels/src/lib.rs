@@ -1,5 +1,8 @@
 #![doc = include_str!("../README.md")]
 
+#[macro_use]
+mod lang;
+
 mod action;
 mod attach;
 mod banner;
@@ -53,6 +56,7 @@ mod zoom;
 pub use action::{Action, Actions};
 pub use banner::Banners;
 pub use export::Exporter;
+pub use lang::Language;
 pub use layout::{is_busy, show};
 pub use log::Log;
 pub use number::plus_minus;

@@ -1,0 +1,270 @@
+//! The language of the window.
+//!
+//! English stands in the code, where it is drawn: `tr!("{} of {}", done, all)`. What it is called
+//! elsewhere stands in `words/*.ron`, all languages beside each other. What a message lacks is said
+//! in English. Messages of the engines, files and logs are English everywhere, so that they can be
+//! sought for.
+//!
+//! Three languages that know one and many at most need no grammar: where that differs, the code has
+//! two messages.
+
+use std::{cell::Cell, collections::HashMap, fmt::Display, sync::OnceLock};
+
+use egui::{DragValue, emath::Numeric};
+use serde::{Deserialize, Serialize};
+
+/// What is said in German and in Chinese, by what is said in English.
+const WORDS: [(&str, &str); 5] = [
+    ("common.ron", include_str!("../words/common.ron")),
+    ("files.ron", include_str!("../words/files.ron")),
+    ("window.ron", include_str!("../words/window.ron")),
+    ("member.ron", include_str!("../words/member.ron")),
+    ("terms.ron", include_str!("../words/terms.ron")),
+];
+
+/// A language that the window speaks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Language {
+    /// English, in which all is written first.
+    #[default]
+    English,
+    /// German.
+    German,
+    /// Chinese, in simplified characters.
+    Chinese,
+}
+
+impl Language {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::English, Self::German, Self::Chinese];
+
+    /// What those who speak it call it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::English => "English",
+            Self::German => "Deutsch",
+            Self::Chinese => "中文",
+        }
+    }
+
+    /// The language of a tag as systems have it (`de-AT`, `zh_CN.UTF-8`); English where it is none
+    /// of ours.
+    ///
+    /// ```
+    /// use intrados_panels::Language;
+    /// assert_eq!(Language::of("de-AT"), Language::German);
+    /// assert_eq!(Language::of("fr"), Language::English);
+    /// ```
+    #[must_use]
+    pub fn of(tag: &str) -> Self {
+        match tag.split(['-', '_', '.']).next() {
+            Some("de") => Self::German,
+            Some("zh") => Self::Chinese,
+            _ => Self::English,
+        }
+    }
+}
+
+thread_local! {
+    /// What is drawn is drawn on one thread.
+    static SPOKEN: Cell<Language> = const { Cell::new(Language::English) };
+}
+
+/// Speaks `language` on this thread, from now on.
+pub(crate) fn speak(language: Language) {
+    SPOKEN.set(language);
+}
+
+/// The language of this thread.
+pub(crate) fn spoken() -> Language {
+    SPOKEN.get()
+}
+
+/// `tr!("{} of {}", done, all)`: a message in the language of the window. `{}` stand for the values
+/// in their order, `{0}` and so on by their place. A word that is two in other languages says which
+/// after a bar, which nobody sees: `tr!("Light|theme")`.
+macro_rules! tr {
+    ($text:literal $(, $value:expr)* $(,)?) => {
+        $crate::lang::say($text, &[$(&$value as &dyn std::fmt::Display),*])
+    };
+}
+
+/// See [`tr!`].
+pub(crate) fn say(text: &str, values: &[&dyn Display]) -> String {
+    filled(translated(text), values)
+}
+
+/// A word that is known only when it is said: a state, a kind, a cause. As it is, where it has no
+/// translation.
+pub(crate) fn term(text: &str) -> String {
+    translated(text).to_owned()
+}
+
+fn translated(text: &str) -> &str {
+    let english = text.split_once('|').map_or(text, |(english, _)| english);
+    let column = match spoken() {
+        Language::English => return english,
+        Language::German => 0,
+        Language::Chinese => 1,
+    };
+    words().get(text).map_or(english, |of| of[column].as_str())
+}
+
+fn words() -> &'static HashMap<String, [String; 2]> {
+    static TABLE: OnceLock<HashMap<String, [String; 2]>> = OnceLock::new();
+    TABLE.get_or_init(|| WORDS.iter().flat_map(|(file, text)| parsed(file, text)).collect())
+}
+
+fn parsed(file: &str, text: &str) -> HashMap<String, [String; 2]> {
+    ron::from_str(text).unwrap_or_else(|error| {
+        tracing::error!("words/{file}: {error}");
+        HashMap::new()
+    })
+}
+
+fn filled(text: &str, values: &[&dyn Display]) -> String {
+    let (mut said, mut rest, mut next) = (String::with_capacity(text.len() + 16), text, 0);
+    while let Some((before, after)) = rest.split_once('{') {
+        let Some((place, behind)) = after.split_once('}') else { break };
+        let which = place.parse().unwrap_or(next);
+        next += 1;
+        said += before;
+        if let Some(value) = values.get(which) {
+            said += &value.to_string();
+        }
+        rest = behind;
+    }
+    said + rest
+}
+
+/// `x` with so many decimals, as the language writes them.
+pub(crate) fn fixed(x: impl Into<f64>, decimals: usize) -> String {
+    local(format!("{:.decimals$}", x.into()))
+}
+
+/// A number as code has it, as the language writes it.
+pub(crate) fn local(number: String) -> String {
+    match spoken() {
+        Language::German => number.replace('.', ","),
+        Language::English | Language::Chinese => number,
+    }
+}
+
+/// A number as somebody types it, with a point or a comma.
+fn typed(text: &str) -> Option<f64> {
+    let text: String = text.chars().filter(|c| !c.is_whitespace()).collect();
+    text.replace('−', "-").replace(',', ".").parse().ok()
+}
+
+/// A field for a number, shown and read as the language writes it.
+pub(crate) fn drag<N: Numeric>(value: &mut N) -> DragValue<'_> {
+    let shown = |x, decimals| local(egui::emath::format_with_decimals_in_range(x, decimals));
+    DragValue::new(value).custom_formatter(shown).custom_parser(typed)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::{
+        collections::BTreeSet,
+        path::{Path, PathBuf},
+    };
+
+    /// Words that are said by [`term`]: no `tr!` has them.
+    const TERMS: &str = "terms.ron";
+
+    /// All sources of this crate.
+    fn pages(folder: &Path, into: &mut Vec<PathBuf>) {
+        for entry in folder.read_dir().unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                pages(&path, into);
+            } else {
+                into.push(path);
+            }
+        }
+    }
+
+    /// What a string of Rust says, from after its first quote.
+    fn literal(code: &str) -> String {
+        let (mut said, mut code) = (String::new(), code.chars().peekable());
+        while let Some(c) = code.next() {
+            match c {
+                '"' => break,
+                '\\' => match code.next() {
+                    Some('n') => said.push('\n'),
+                    Some('\n') => while code.next_if(|c| c.is_whitespace()).is_some() {},
+                    Some(other) => said.push(other),
+                    None => {}
+                },
+                _ => said.push(c),
+            }
+        }
+        said
+    }
+
+    /// All that this crate says by `tr!`, outside of its tests.
+    fn said() -> BTreeSet<String> {
+        let mut all = Vec::new();
+        pages(Path::new("src"), &mut all);
+        let mut said = BTreeSet::new();
+        for page in all.iter().filter(|p| !p.ends_with("lang.rs")) {
+            let code = std::fs::read_to_string(page).unwrap();
+            let code = code.split("#[cfg(test)]\nmod tests {").next().unwrap();
+            for call in code.split("tr!(").skip(1) {
+                let call = call.trim_start();
+                assert!(call.starts_with('"'), "{}: tr! of no literal: {call:.40}", page.display());
+                said.insert(literal(&call[1..]));
+            }
+        }
+        said
+    }
+
+    /// Which values a message shows: `{}` by their order.
+    fn shown(text: &str) -> Vec<usize> {
+        let places = text.split('{').skip(1).map(|rest| rest.split('}').next().unwrap());
+        let mut shown: Vec<usize> =
+            places.enumerate().map(|(i, place)| place.parse().unwrap_or(i)).collect();
+        shown.sort_unstable();
+        shown
+    }
+
+    #[test]
+    fn every_message_is_said_in_every_language_and_none_for_nothing() {
+        let said = said();
+        let mut known = BTreeSet::new();
+        for (file, text) in WORDS {
+            let words: HashMap<String, [String; 2]> = ron::from_str(text).unwrap();
+            for (english, others) in words {
+                let message = english.split('|').next().unwrap();
+                for other in others {
+                    assert_eq!(shown(message), shown(&other), "{file}: {english:?}: {other:?}");
+                    assert!(!other.is_empty(), "{file}: {english:?}");
+                }
+                let is_said = file == TERMS || said.contains(&english);
+                assert!(is_said, "{file}: nobody says {english:?}");
+                assert!(known.insert(english.clone()), "{file}: {english:?} stands there twice");
+            }
+        }
+        let missing: Vec<&String> = said.difference(&known).collect();
+        assert!(missing.is_empty(), "without a translation: {missing:#?}");
+    }
+
+    #[test]
+    fn values_go_where_a_language_wants_them() {
+        assert_eq!(filled("{} of {}", &[&3, &"x"]), "3 of x");
+        assert_eq!(filled("{1} 中的 {0}", &[&3, &"x"]), "x 中的 3");
+        assert_eq!(filled("none", &[]), "none");
+    }
+
+    #[test]
+    fn numbers_have_a_comma_in_german_and_are_read_with_either() {
+        speak(Language::German);
+        assert_eq!(fixed(0.25, 2), "0,25");
+        speak(Language::English);
+        assert_eq!(fixed(0.25, 2), "0.25");
+        assert_eq!((typed("0,25"), typed("−1.5"), typed("x")), (Some(0.25), Some(-1.5), None));
+    }
+}
