@@ -475,7 +475,7 @@ fn drawn_life(
     for drawn in pictures.finish().map_err(cannot)? {
         files.place(drawn.file_name().unwrap_or_default().to_string_lossy());
     }
-    Ok((life, looking.damage.into_iter().filter(|d| !d.is_empty()).collect()))
+    Ok((life, looking.last().into_iter().filter(|d| !d.is_empty()).collect()))
 }
 
 /// A file of a set, named where it would have come to lie.

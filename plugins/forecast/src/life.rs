@@ -55,6 +55,9 @@ const CRACKED: f64 = 0.5;
 const ASSUMED: f64 = 30e6;
 /// Cracks narrower than this are none, mm.
 const LEAST_MM: f64 = 0.01;
+/// Damage that differs by less is alike, and so are times apart by less than this share of a life.
+const ALIKE: f64 = 0.01;
+const MOMENT: f64 = 1.0 / 32.0;
 /// Sectors of a lining's ring: its sections are those of its wall.
 const SECTORS: f64 = 12.0;
 
@@ -181,11 +184,24 @@ impl Stressed {
     }
 }
 
+/// What a life had come to at one of its equilibria.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Passed {
+    /// Years since the life began.
+    pub years: f64,
+    /// Damage d of the zones, rust in it where it is computed.
+    pub damage: [f64; ZONES],
+}
+
 /// The future of one member.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Forecast {
     /// Its id.
     pub id: String,
+    /// How it comes to that: equilibria that were computed, in order of time, those left out that
+    /// hardly differ from one that is told.
+    #[serde(default)]
+    pub course: Vec<Passed>,
     /// Now.
     pub now: [Foretold; ZONES],
     /// `ahead_years` on; none: the member does not get that far.
@@ -287,6 +303,7 @@ pub fn forecast(
             rust,
             elastic: scene.structure.assembly(model).and_then(|a| part.stressed(a)),
             now: part.now,
+            course: part.course,
             later: outcome.complaint.is_empty().then_some(part.last),
             ahead_years: settings.ahead_years,
             age_years: now / YEAR,
@@ -394,6 +411,8 @@ struct Watch<'a> {
     prepared: &'a Prepared,
     rule: &'a GradingRule,
     until: f64,
+    /// From the beginning of the life to its end, s.
+    span: f64,
     job: &'a Job,
     parts: Vec<PartWatch>,
     /// The part that a brick belongs to.
@@ -415,6 +434,7 @@ struct PartWatch {
     peak: f64,
     now: [Foretold; ZONES],
     last: [Foretold; ZONES],
+    course: Vec<Passed>,
 }
 
 /// A layer of bricks across the axis, of a ring a sector of it.
@@ -456,6 +476,7 @@ impl<'a> Watch<'a> {
                 peak: 0.0,
                 now: empty,
                 last: empty,
+                course: Vec::new(),
             }
         };
         let mut part_of = vec![None; prepared.model.mesh.hexes.len()];
@@ -472,6 +493,7 @@ impl<'a> Watch<'a> {
             prepared,
             rule,
             until,
+            span: prepared.times.last().copied().unwrap_or(0.0),
             job,
             parts: prepared.parts.iter().map(part).collect(),
             part_of,
@@ -515,7 +537,7 @@ impl<'a> Watch<'a> {
         zones
     }
 
-    /// Adds rust to what is foretold of a part for now and for the end of its life.
+    /// Adds rust to what is foretold of a part for now, for the end of its life and on the way.
     fn corrode(&mut self, part: usize, now: f64, end: f64) -> Rust {
         let corrosion = match &self.prepared.corrosion {
             Ok(corrosion) => corrosion,
@@ -529,6 +551,13 @@ impl<'a> Watch<'a> {
                 let Lost { share, std_error, .. } = corrosion.lost(bars, age);
                 (told.steel_lost, told.steel_lost_std_error) = (Some(share), std_error);
                 told.damage = together([told.concrete, share]);
+            }
+        }
+        for passed in &mut told.course {
+            let age = age(passed.years * YEAR);
+            for (damage, bars) in passed.damage.iter_mut().zip(&bars).filter(|(_, b)| !b.is_empty())
+            {
+                *damage = together([*damage, corrosion.lost(bars, age).share]);
             }
         }
         Rust::of(corrosion, &bars, age(now))
@@ -661,6 +690,24 @@ fn largest(point: &Point) -> f64 {
 }
 
 impl PartWatch {
+    /// Notes an equilibrium, in the place of the last one where that is like the one before it: so
+    /// that of now and the last of all are always told.
+    fn pass(&mut self, time: f64, [now, span]: [f64; 2], zones: &[Foretold; ZONES]) {
+        let passed = Passed { years: time / YEAR, damage: zones.map(|told| told.concrete) };
+        let is_like = |a: &Passed, b: &Passed| {
+            let apart = a.damage.iter().zip(&b.damage).map(|(a, b)| (a - b).abs());
+            apart.fold(0.0, f64::max) < ALIKE && (b.years - a.years) * YEAR < span * MOMENT
+        };
+        if let [.., before, last] = &mut *self.course
+            && is_like(before, last)
+            && (last.years * YEAR - now).abs() > 60.0
+        {
+            *last = passed;
+        } else {
+            self.course.push(passed);
+        }
+    }
+
     /// How its matter is stressed, where that is elastic.
     fn stressed(&self, assembly: &Assembly) -> Option<Stressed> {
         let matter = assembly.matter.as_ref()?.name.clone();
@@ -697,6 +744,8 @@ impl Observer for Watch<'_> {
                 self.parts[part].now = zones;
             }
             self.parts[part].last = zones;
+            let kept = [self.until, self.span];
+            self.parts[part].pass(step.time, kept, &zones);
         }
         let passed = self.prepared.times.iter().filter(|&&time| time <= step.time).count();
         Ok(self.job.step(passed, self.prepared.times.len())?)
@@ -810,7 +859,7 @@ impl Forecast {
             basis += "; concrete or bars are assumed, and the error is wider for it";
         }
         let serde_json::Value::Object(details) = json!({
-            "assumed_error": self.assumed_error, "age_years": self.age_years, "now": self.now, "later": self.later, "ahead_years": self.ahead_years,
+            "assumed_error": self.assumed_error, "age_years": self.age_years, "now": self.now, "later": self.later, "ahead_years": self.ahead_years, "course": self.course,
             "later_damage": self.later.as_ref().map(|l| most(l, |t| t.damage)),
             "peak_compression_pa": self.peak_compression_pa, "peak_bar_pa": self.peak_bar_pa, "peak_tendon_pa": self.peak_tendon_pa,
             "rust": self.rust, "unknowns": self.dof, "complaint": self.complaint, "notes": self.notes,

@@ -131,15 +131,7 @@ fn heard_of(scene: &Scene, series: &Series, forecast: &Forecast) -> Result<Drift
     let course = forecast.gauges.iter().find(|c| c.gauge == series.gauge).ok_or(
         "it measures no strain of its member: of displacement and stress a load test says more",
     )?;
-    drift(series, course, forecast.age_years, last_date(scene))
-}
-
-/// The day that counts as now: that of the inspection, else the last of all evidence.
-fn last_date(scene: &Scene) -> Option<Date> {
-    let structure = &scene.structure;
-    let seen = structure.observations.iter().filter_map(|o| o.date);
-    let read = structure.series.iter().flat_map(|s| &s.samples).map(|s| s.date);
-    structure.project.inspected.or_else(|| seen.chain(read).max())
+    drift(series, course, forecast.age_years, scene.structure.today())
 }
 
 /// Takes temperature and creep out of a series of a member that is `age_years` old at the day

@@ -37,9 +37,22 @@ pub struct Stop(pub String);
 pub struct Life {
     /// Its results; they say whether it ended early.
     pub outcome: Arc<Outcome>,
-    /// What is to be seen of it from outside.
-    damage: Vec<SurfaceDamage>,
+    /// What is to be seen of it from outside at each equilibrium, and when that is, s.
+    damage: Vec<(f64, Vec<SurfaceDamage>)>,
 }
+
+impl Life {
+    /// What is to be seen of it: at the last equilibrium until then; before the first one nothing.
+    fn damage(&self, until: f64) -> &[SurfaceDamage] {
+        let passed = self.damage.partition_point(|(time, _)| *time <= until);
+        passed.checked_sub(1).map_or(&[], |last| &self.damage[last].1)
+    }
+}
+
+/// The moment of their lives at which members show their surfaces, s; none: the end of what was
+/// computed.
+#[derive(Resource, Debug, Clone, Copy, PartialEq, Default)]
+pub struct ShownAt(pub Option<f64>);
 
 /// One analysis.
 #[derive(Debug)]
@@ -75,6 +88,7 @@ pub struct MechanicsPlugin;
 impl Plugin for MechanicsPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<Analyses>()
+            .init_resource::<ShownAt>()
             .init_resource::<Jobs>()
             .add_message::<Analyze>()
             .add_message::<Stop>()
@@ -156,20 +170,26 @@ fn stop(mut wishes: MessageReader<Stop>, analyses: Res<Analyses>) {
 /// Takes what has ended, and puts what is to be seen on the members' entities.
 fn take(
     mut analyses: ResMut<Analyses>,
+    at: Res<ShownAt>,
     members: Query<(Entity, &Member, Option<&SurfaceDamage>)>,
     mut commands: Commands,
 ) {
     for analysis in analyses.bypass_change_detection().0.values_mut() {
-        if !analysis.work.settle() {
+        if !analysis.work.settle() && !at.is_changed() {
             continue;
         }
         let Work::Done(life) = &analysis.work else { continue };
+        let (end, then) =
+            (life.damage(f64::INFINITY), life.damage(at.0.unwrap_or(f64::INFINITY)));
         for (entity, member, before) in &members {
-            let Some(now) = life.damage.iter().find(|d| d.member == member.id) else { continue };
+            let of = |all: &[SurfaceDamage]| all.iter().find(|d| d.member == member.id).cloned();
+            let Some(last) = of(end) else { continue };
+            let sound = SurfaceDamage { cracks: Vec::new(), spalls: Vec::new(), ..last };
+            let now = of(then).unwrap_or(sound);
             match before {
-                Some(before) if before == now => {}
+                Some(before) if *before == now => {}
                 None if now.is_empty() => {}
-                _ => drop(commands.entity(entity).insert(now.clone())),
+                _ => drop(commands.entity(entity).insert(now)),
             }
         }
     }

@@ -482,13 +482,13 @@ impl Seen {
     }
 }
 
-/// Looks at every equilibrium from outside, and keeps what the last one left on the surface.
+/// Looks at every equilibrium from outside, and keeps what each left on the surface.
 pub struct Looking<'a> {
     prepared: &'a Prepared,
     skin: Arc<Skin>,
     seen: Seen,
-    /// Of the last equilibrium.
-    pub damage: Vec<SurfaceDamage>,
+    /// Of each equilibrium, and when that was, s.
+    pub damage: Vec<(f64, Vec<SurfaceDamage>)>,
 }
 
 impl<'a> Looking<'a> {
@@ -498,6 +498,12 @@ impl<'a> Looking<'a> {
         let skin = Arc::new(Skin::new(prepared));
         seen.lock().skin = Some(Arc::clone(&skin));
         Self { prepared, skin, seen, damage: Vec::new() }
+    }
+
+    /// What the last equilibrium left on the surface.
+    #[must_use]
+    pub fn last(self) -> Vec<SurfaceDamage> {
+        self.damage.into_iter().next_back().map(|(_, damage)| damage).unwrap_or_default()
     }
 }
 
@@ -511,7 +517,8 @@ impl Observer for Looking<'_> {
     ) -> Result<(), Failure> {
         let shot = Arc::new(self.skin.look(structure, history, step, points));
         self.seen.lock().shots.push(shot);
-        self.damage = self.skin.surface_damage(self.prepared, step.time, points);
+        let damage = self.skin.surface_damage(self.prepared, step.time, points);
+        self.damage.push((step.time, damage));
         Ok(())
     }
 }

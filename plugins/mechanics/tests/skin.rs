@@ -104,7 +104,8 @@ fn a_bent_beam_shows_one_crack() {
     let (outcome, history) = analyze(&prepared, settings, &Job::default(), &mut looking).unwrap();
     assert!(outcome.complaint.is_empty(), "{}", outcome.complaint);
     let points = System::new(&prepared.model).unwrap().all_points(&history).unwrap();
-    let [damage] = &looking.damage[..] else { panic!("{:?}", looking.damage) };
+    let left = looking.last();
+    let [damage] = &left[..] else { panic!("{left:?}") };
     assert!(damage.member == "B" && damage.spalls.is_empty());
     // Traces of soffit and sides are one crack, not one a face.
     let [crack] = &damage.cracks[..] else { panic!("{:#?}", damage.cracks) };

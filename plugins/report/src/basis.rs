@@ -56,9 +56,7 @@ impl Basis {
         if project.structure.is_empty() {
             project.structure = scene.name.clone();
         }
-        project.inspected = project
-            .inspected
-            .or_else(|| scene.structure.observations.iter().filter_map(|o| o.date).max());
+        project.inspected = scene.structure.today();
         let on_earth = on_earth(scene);
         Self { project, on_earth, members: scene.members.iter().enumerate().map(member).collect() }
     }

@@ -51,6 +51,7 @@ fn salt_without_numbers_is_assumed_with_its_spread() {
         evidence.basis
     );
     assert!(evidence.details["rust"]["depassivation_years"].as_f64().unwrap() < 30.0);
+    its_course_passes_what_is_foretold(&evidence.details);
     let folder = tempfile::tempdir().unwrap();
     let mut document = intrados_report::Document::of(&scene, prediction);
     intrados_report::write(
@@ -85,6 +86,25 @@ fn salt_without_numbers_is_assumed_with_its_spread() {
         (p.values().map(|v| v.as_f64().unwrap()).sum::<f64>() - 1.0).abs() < 1e-9
             && json["members"][0]["basis"] == "forecast"
     );
+}
+
+/// From its youth to the end of the forecast, by way of today; rust takes more and more.
+fn its_course_passes_what_is_foretold(details: &serde_json::Map<String, serde_json::Value>) {
+    let course: Vec<forecast::Passed> = serde_json::from_value(details["course"].clone()).unwrap();
+    let [age, ahead] = ["age_years", "ahead_years"].map(|key| details[key].as_f64().unwrap());
+    assert!(course.len() > 5, "{course:?}");
+    assert!(course.is_sorted_by(|a, b| a.years < b.years), "{course:?}");
+    for (when, years) in [("now", age), ("later", age + ahead)] {
+        let passed = course.iter().find(|p| (p.years - years).abs() < 1e-3).expect(when);
+        let foretold: Vec<forecast::Foretold> =
+            serde_json::from_value(details[when].clone()).unwrap();
+        for (passed, foretold) in passed.damage.iter().zip(&foretold) {
+            assert!((passed - foretold.damage).abs() < 1e-9, "{when}: {passed} {foretold:?}");
+        }
+    }
+    let worst = |p: &forecast::Passed| p.damage.iter().copied().fold(0.0, f64::max);
+    let old = course.iter().filter(|p| p.years > 1.0);
+    assert!(old.is_sorted_by(|a, b| worst(a) <= worst(b) + 0.02), "{course:?}");
 }
 
 /// Where no code knows, nothing is said of steel, and that is said.

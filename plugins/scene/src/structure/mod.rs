@@ -137,6 +137,25 @@ impl Structure {
         self.concretes.iter().find(|c| c.name == name)
     }
 
+    /// The days on which something of it was seen or read, each once, in order.
+    #[must_use]
+    pub fn dates(&self) -> Vec<Date> {
+        let seen = self.observations.iter().filter_map(|o| o.date);
+        let taken = self.photographs.iter().filter_map(|p| p.date);
+        let read = self.series.iter().flat_map(|s| &s.samples).map(|s| s.date);
+        let mut dates: Vec<Date> = seen.chain(taken).chain(read).collect();
+        dates.sort_unstable();
+        dates.dedup();
+        dates
+    }
+
+    /// The day that counts as now: that of the inspection, else the last on which something of it
+    /// was seen or read; none: nobody says.
+    #[must_use]
+    pub fn today(&self) -> Option<Date> {
+        self.project.inspected.or_else(|| self.dates().pop())
+    }
+
     /// Whether anything holds the assembly of that id.
     #[must_use]
     pub fn is_held(&self, id: &str) -> bool {
