@@ -1,10 +1,7 @@
 //! When a structure is looked at: now, or as many years on as its lives were computed. Nothing
 //! between is shown, since nobody has computed it.
 
-use intrados_damage::{
-    verdict::Basis,
-    zone::{ZONES, place},
-};
+use intrados_damage::{verdict::Basis, zone::ZONES};
 use intrados_predict::MemberPrediction;
 use intrados_scene::Scene;
 
@@ -67,6 +64,11 @@ impl Course {
         let worst = (0..ZONES).max_by(|a, b| added(a).total_cmp(&added(b))).unwrap_or_default();
         (place(worst), self.now[worst], self.later[worst])
     }
+}
+
+/// Where a zone is on its axis.
+pub(crate) fn place(zone: usize) -> String {
+    tr!("{} to {} %", 100 * zone / ZONES, 100 * (zone + 1) / ZONES)
 }
 
 /// For how many years lives were computed; none: of no member.

@@ -47,6 +47,7 @@ impl Plugin for PanelsPlugin {
         app.init_resource::<Panels>()
             .init_resource::<Actions>()
             .init_resource::<Selection>()
+            .init_resource::<workspace::SystemLanguage>()
             .init_resource::<Look>()
             .init_resource::<Viewpoint>()
             .init_resource::<Statistics>()

@@ -21,6 +21,7 @@ use crate::{
     Action, Actions, Latest, Selection,
     attach::Form,
     history::{Earlier, History},
+    lang::fixed,
     moment::{self, Moment, Seen},
 };
 
@@ -35,12 +36,14 @@ pub(crate) enum View {
     Along(Vec3),
 }
 
-/// Sides, by their names and keys.
-const SIDES: [(&str, Vec3); 3] = [
-    ("Front", Vec3::new(0.0, 0.06, 1.0)),
-    ("Side", Vec3::new(1.0, 0.06, 0.0)),
-    ("Top", Vec3::new(0.0, 1.0, 0.02)),
-];
+/// Sides, by their names.
+fn sides() -> [(String, Vec3); 3] {
+    [
+        (tr!("Front|view"), Vec3::new(0.0, 0.06, 1.0)),
+        (tr!("Side|view"), Vec3::new(1.0, 0.06, 0.0)),
+        (tr!("Top|view"), Vec3::new(0.0, 1.0, 0.02)),
+    ]
+}
 
 /// What the panel remembers.
 #[derive(Resource)]
@@ -202,8 +205,12 @@ impl Shown<'_> {
         let (Some(value), Some(years)) = (value, self.years) else { return String::new() };
         match self.when {
             Moment::Now => String::new(),
-            Moment::Ahead => format!("In {years:.0} years: d = {value:.2} at least"),
-            Moment::Added => format!("{years:.0} years add {value:.2}, by the forecast"),
+            Moment::Ahead => {
+                tr!("In {} years: d = {} at least", fixed(years, 0), fixed(value, 2))
+            }
+            Moment::Added => {
+                tr!("{} years add {}, by the forecast", fixed(years, 0), fixed(value, 2))
+            }
         }
     }
 }
@@ -255,15 +262,15 @@ fn tools(
     frame.show(ui, |ui| {
         ui.horizontal(|ui| {
             views(ui, structure, selection, actions);
-            ui.toggle_value(&mut structure.names, "Names")
-                .on_hover_text("Name and damage of every member, the worst first");
+            ui.toggle_value(&mut structure.names, tr!("Names"))
+                .on_hover_text(tr!("Name and damage of every member, the worst first"));
             let mut is_cut = structure.section.is_some();
-            let hint = "Cuts it open, through the middle of the selected member";
-            if ui.toggle_value(&mut is_cut, "Section").on_hover_text(hint).changed() {
+            let hint = tr!("Cuts it open, through the middle of the selected member");
+            if ui.toggle_value(&mut is_cut, tr!("Section")).on_hover_text(hint).changed() {
                 structure.section = is_cut.then(|| structure.model.section(selection.0));
             }
-            let hint = "The distance between two places that are clicked";
-            let tape = ui.toggle_value(&mut structure.tape.is_on, "Measure");
+            let hint = tr!("The distance between two places that are clicked");
+            let tape = ui.toggle_value(&mut structure.tape.is_on, tr!("Measure"));
             if tape.on_hover_text(hint).changed() {
                 structure.tape.clear();
             }
@@ -281,7 +288,7 @@ fn tools(
         frame.show(ui, |ui| {
             ui.horizontal(|ui| {
                 ui.label(structure.tape.said());
-                if ui.button("Clear the tape").clicked() {
+                if ui.button(tr!("Clear the tape")).clicked() {
                     structure.tape.clear();
                 }
             })
@@ -292,44 +299,48 @@ fn tools(
 /// Which earlier prediction is looked at beside the newest.
 fn compared(ui: &mut Ui, history: &mut History, actions: &mut Actions) {
     let mut chosen = history.chosen();
-    let button = ui.menu_button("Compare", |ui| {
-        ui.selectable_value(&mut chosen, None, "Nothing");
+    let button = ui.menu_button(tr!("Compare"), |ui| {
+        ui.selectable_value(&mut chosen, None, tr!("Nothing"));
         for (index, title) in history.titles().enumerate() {
             ui.selectable_value(&mut chosen, Some(index), title);
         }
         ui.separator();
-        if ui.button("Open an earlier prediction…").clicked() {
+        if ui.button(tr!("Open an earlier prediction…")).clicked() {
             actions.ask(Action::ChoosePrediction);
         }
     });
-    let hint = "An earlier prediction beside this one: of before a change, or the predict.json of another day";
+    let hint = tr!("An earlier prediction beside this one: of before a change, \
+         or the predict.json of another day");
     button.response.on_hover_text(hint);
     history.choose(chosen);
 }
 
 /// When it is looked at.
 fn moments(ui: &mut Ui, moment: &mut Moment, years: f64) {
-    let hint = "Damage as it is known now";
-    ui.selectable_value(moment, Moment::Now, "Now").on_hover_text(hint);
-    let hint = "What is known now, and more where the forecast says more. Only the end of the forecast was computed: there is nothing between.";
-    let ahead = format!("In {years:.0} years");
+    let hint = tr!("Damage as it is known now");
+    ui.selectable_value(moment, Moment::Now, tr!("Now")).on_hover_text(hint);
+    let hint = tr!(
+        "What is known now, and more where the forecast says more. Only the end of the forecast \
+         was computed: there is nothing between."
+    );
+    let ahead = tr!("In {} years", fixed(years, 0));
     ui.selectable_value(moment, Moment::Ahead, ahead).on_hover_text(hint);
-    let hint = "Damage at the end of the forecast less that of now, both by the forecast";
-    let added = format!("What {years:.0} years add");
+    let hint = tr!("Damage at the end of the forecast less that of now, both by the forecast");
+    let added = tr!("What {} years add", fixed(years, 0));
     ui.selectable_value(moment, Moment::Added, added).on_hover_text(hint);
 }
 
 fn views(ui: &mut Ui, structure: &mut Structure, selection: Selection, actions: &mut Actions) {
-    let all = ui.button("All").on_hover_text("The whole structure (Home)");
+    let all = ui.button(tr!("All")).on_hover_text(tr!("The whole structure (Home)"));
     if all.clicked() {
         actions.ask(Action::Home);
     }
-    let hint = "The selected member fills the picture (F)";
-    let member = ui.add_enabled(selection.0.is_some(), egui::Button::new("Selected"));
+    let hint = tr!("The selected member fills the picture (F)");
+    let member = ui.add_enabled(selection.0.is_some(), egui::Button::new(tr!("Selected")));
     if member.on_hover_text(hint).clicked() {
         actions.ask(Action::Frame);
     }
-    for (name, axis) in SIDES {
+    for (name, axis) in sides() {
         if ui.button(name).clicked() {
             structure.look(View::Along(axis));
         }
