@@ -53,6 +53,8 @@ impl Plugin for PanelsPlugin {
             .init_resource::<Statistics>()
             .init_resource::<Latest>()
             .init_resource::<history::History>()
+            .init_resource::<moment::Moment>()
+            .init_resource::<moment::Courses>()
             .init_resource::<Log>()
             .init_resource::<picture::Picture>()
             .init_resource::<picture::Cursor>()
@@ -93,7 +95,7 @@ impl Plugin for PanelsPlugin {
                 Update,
                 (
                     prediction::gather,
-                    history::keep,
+                    (history::keep, moment::follow),
                     refine::keep_time,
                     picture::develop,
                     fields::paint,

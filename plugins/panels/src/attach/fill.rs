@@ -61,7 +61,7 @@ impl Form {
     }
 
     fn cut(&self) -> Result<Cut, String> {
-        let depth: Option<f32> = number(&tr!("depth"), &self.depth_mm)?;
+        let depth: Option<f32> = number(&tr!("depth|of damage"), &self.depth_mm)?;
         let diameter_mm = number(&tr!("diameter"), &self.diameter_mm)?;
         Ok(Cut { depth_m: depth.map(|mm| 1e-3 * mm), diameter_mm, axis: None })
     }
@@ -93,7 +93,7 @@ impl Form {
             },
             "spall" => Finding::Spall {
                 area_m2: area_m2()?,
-                depth_mm: number(&tr!("depth"), &self.depth_mm)?,
+                depth_mm: number(&tr!("depth|of damage"), &self.depth_mm)?,
                 bars_bare: false,
             },
             "rust stain" => Finding::Rust { area_m2: area_m2()? },

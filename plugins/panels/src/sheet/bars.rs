@@ -59,14 +59,29 @@ pub(super) fn bars(ui: &mut Ui, predicted: &Predicted) {
          hatched: unknown"));
 }
 
-/// Damage that is foretold, zone by zone: of now on the left, of the end of the forecast on the
-/// right.
-pub(super) fn foretold(ui: &mut Ui, course: &Course) {
-    let years = fixed(course.years, 0);
-    let name = tr!("Forecast now and in {} years", years);
-    let sides = [course.now.map(Some), course.later.map(Some)];
+/// Damage by the life, zone by zone: of now on the left, of another year on the right.
+pub(super) fn foretold(ui: &mut Ui, course: &Course, years: f64) {
+    let [now, then] = [0.0, years].map(|years| course.at(years));
+    let (Some(now), Some(then)) = (now, then) else { return };
+    let sides = [now.map(Some), then.map(Some)];
+    let (name, said) = match years < 0.0 {
+        false => {
+            let years = fixed(years, 0);
+            (
+                tr!("Forecast now and in {} years", years),
+                tr!("each zone by the forecast: left now, right in {} years", years),
+            )
+        }
+        true => {
+            let years = fixed(-years, 0);
+            (
+                tr!("Its life now and {} years ago", years),
+                tr!("each zone by its life: left now, right {} years ago", years),
+            )
+        }
+    };
     two(ui, &name, sides, [tr!("now"), tr!("then|in future")]);
-    ui.weak(tr!("each zone by the forecast: left now, right in {} years", years));
+    ui.weak(said);
 }
 
 /// Damage zone by zone, of two predictions or times: one on the left, one on the right; nothing

@@ -4,6 +4,7 @@
 mod bars;
 mod capacity;
 mod compare;
+mod course;
 mod evidence;
 mod faces;
 mod links;
@@ -22,7 +23,7 @@ use crate::{
     Action, Actions, Latest, Selection, colours,
     history::History,
     lang::{fixed, term},
-    moment::Course,
+    moment::{Course, Courses, Moment},
     number::{copied, plus_minus},
 };
 
@@ -35,6 +36,7 @@ pub(crate) fn member(
     scene: Option<Res<CurrentScene>>,
     latest: Res<Latest>,
     history: Res<History>,
+    (courses, moment): (Res<Courses>, Res<Moment>),
     selection: Res<Selection>,
     mut mechanics: Mechanics,
     mut listing: ResMut<Listing>,
@@ -71,7 +73,7 @@ pub(crate) fn member(
         listing.bypass_change_detection().show(ui, scene, member, result, &mut actions);
     });
     if let Some(told) = told {
-        section(ui, "Forecast", |ui| foretold(ui, told));
+        section(ui, "Forecast", |ui| foretold(ui, told, courses.get(index), *moment));
     }
     section(ui, "Capacity", |ui| {
         capacity::capacity(ui, scene, member, told, &mut mechanics, &mut actions);
@@ -208,8 +210,25 @@ fn sources(ui: &mut Ui, told: &MemberPrediction) {
     }
 }
 
+/// How its damage grows over the years; zone by zone for the year that is looked at, the last one
+/// where that is now.
+fn life(ui: &mut Ui, course: &Course, moment: Moment) {
+    let years = if moment.is_now() { course.end() } else { moment.years };
+    if let Some((zone, now, later)) = course.worst(years).filter(|_| years > 0.0) {
+        ui.label(tr!(
+            "In {} years it loses most in {} of the axis: d = {} becomes {}.",
+            fixed(years, 0),
+            zone,
+            fixed(now, 2),
+            fixed(later, 2)
+        ));
+    }
+    bars::foretold(ui, course, years);
+    course::plot(ui, course, moment);
+}
+
 /// What its life by mechanics and rust says.
-fn foretold(ui: &mut Ui, told: &MemberPrediction) {
+fn foretold(ui: &mut Ui, told: &MemberPrediction, course: Option<&Course>, moment: Moment) {
     let Some(forecast) = told.evidence.get("forecast") else {
         ui.weak(tr!("No forecast: nothing is known of its loads or its exposure."));
         return;
@@ -217,16 +236,8 @@ fn foretold(ui: &mut Ui, told: &MemberPrediction) {
     let value = plus_minus(forecast.damage, forecast.std_error, "");
     copied(ui, RichText::new(format!("d = {}", value.trim())));
     ui.label(&forecast.basis);
-    if let Some(course) = Course::of(told) {
-        let (zone, now, later) = course.worst();
-        ui.label(tr!(
-            "In {} years it loses most in {} of the axis: d = {} becomes {}.",
-            fixed(course.years, 0),
-            zone,
-            fixed(now, 2),
-            fixed(later, 2)
-        ));
-        bars::foretold(ui, &course);
+    if let Some(course) = course {
+        life(ui, course, moment);
     }
     let rust = forecast.details.get("rust");
     let Some(rust) = rust else { return };

@@ -17,7 +17,7 @@ use intrados_light::plugin::Widening;
 use intrados_mechanics::{
     analysis::Outcome,
     member::Meshing,
-    plugin::{Analyses, Analysis, Analyze, Stop},
+    plugin::{Analyses, Analysis, Analyze, ShownAt, Stop},
     skin::{Skin, Snapshot},
 };
 use intrados_scene::{Camera, Scene, SurfaceDamage, plugin::CurrentScene};
@@ -53,6 +53,8 @@ pub(crate) struct Stress {
     scale: Option<f32>,
     /// Which equilibrium; none: the newest.
     moment: Option<usize>,
+    /// The moment of the structure that was last followed.
+    followed: ShownAt,
     /// Largest edge of an element, m; 0: one that suits the section.
     element: f64,
     /// Only the selected member of a model of several.
@@ -76,6 +78,7 @@ impl Default for Stress {
             quantity: Quantity::default(),
             scale: None,
             moment: None,
+            followed: ShownAt::default(),
             element: 0.0,
             alone: false,
             mesh: true,
@@ -150,6 +153,7 @@ pub(crate) fn stress(
     scene: Option<Res<CurrentScene>>,
     selection: Res<Selection>,
     analyses: Option<Res<Analyses>>,
+    at: Res<ShownAt>,
     damage: Query<&SurfaceDamage>,
     mut widening: ResMut<Widening>,
     mut stress: ResMut<Stress>,
@@ -186,6 +190,13 @@ pub(crate) fn stress(
     let (Some(skin), true) = (skin, count > 0) else {
         return waiting(ui, analysis);
     };
+    if *at != stress.followed {
+        // The last equilibrium until then, as of the whole structure.
+        let shots = analysis.seen.shots();
+        let passed = |until: f64| shots.partition_point(|shot| shot.time <= until);
+        stress.moment = at.0.map(|until| passed(until).saturating_sub(1));
+        stress.followed = *at;
+    }
     // More moments come while it runs.
     let index = stress.moment.unwrap_or(usize::MAX).min(count - 1);
     let Some(shot) = analysis.seen.shot(index) else { return };
@@ -348,7 +359,7 @@ fn controls(ui: &mut Ui, stress: &mut Stress, skin: &Skin, auto: f32) {
         });
         let label = ui.label(tr!("Deformation ×"));
         let mut scale = stress.scale.unwrap_or(auto);
-        let slider = Slider::new(&mut scale, 0.0..=(20.0 * auto).max(100.0))
+        let slider = lang::slide(&mut scale, 0.0..=(20.0 * auto).max(100.0))
             .logarithmic(true)
             .smallest_positive(0.1)
             .max_decimals(1);

@@ -4,7 +4,9 @@ mod compass;
 mod measure;
 mod model;
 mod section;
+mod settled;
 mod spot;
+mod time;
 
 use std::sync::Arc;
 
@@ -15,6 +17,7 @@ use intrados_scene::{Scene, plugin::CurrentScene};
 use measure::Tape;
 use model::Scale;
 use section::Section;
+use settled::{Light, Settling};
 pub(crate) use spot::Spot;
 
 use crate::{
@@ -22,7 +25,7 @@ use crate::{
     attach::Form,
     history::{Earlier, History},
     lang::fixed,
-    moment::{self, Moment, Seen},
+    moment::{Courses, Moment, Seen, Timeline},
 };
 
 /// Where the structure is looked at from.
@@ -57,21 +60,37 @@ pub(crate) struct Structure {
     section: Option<Section>,
     tape: Tape,
     wished: Option<View>,
-    moment: Moment,
+    /// Whether it is shown as it looks, not by its damage.
+    is_lit: bool,
+    settling: Settling,
 }
 
 impl Default for Structure {
     fn default() -> Self {
         let (model, tape) = (model::Model::default(), Tape::default());
-        let moment = Moment::default();
         let earlier = model::Model::earlier();
-        Self { model, earlier, names: true, section: None, tape, wished: None, moment }
+        let (is_lit, settling) = (false, Settling::default());
+        Self {
+            model,
+            earlier,
+            names: true,
+            section: None,
+            tape,
+            wished: None,
+            is_lit,
+            settling,
+        }
     }
 }
 
 impl Structure {
     pub(crate) fn look(&mut self, view: View) {
         self.wished = Some(view);
+    }
+
+    /// Whether it shows the path-traced picture.
+    pub(crate) fn is_lit(&self) -> bool {
+        self.is_lit
     }
 
     /// The place on a member that is at a point of the window, while the picture is in sight.
@@ -91,7 +110,8 @@ impl Default for Preview {
 
 impl Preview {
     pub(crate) fn show(&mut self, ui: &mut Ui, rect: Rect, scene: &Arc<Scene>) {
-        self.0.show(ui, rect, scene, &[], Scale::DAMAGE, Selection(None), None);
+        let shown = self.0.show(ui, rect, scene, &[], Scale::DAMAGE, Selection(None), None);
+        shown.iter().for_each(|shown| model::ruler(ui, rect, &shown.camera));
     }
 }
 
@@ -102,6 +122,9 @@ pub(crate) fn structure(
     mut history: ResMut<History>,
     selection: Res<Selection>,
     mut structure: ResMut<Structure>,
+    courses: Res<Courses>,
+    mut moment: ResMut<Moment>,
+    mut light: Light<'_>,
     mut form: ResMut<Form>,
     mut actions: ResMut<Actions>,
 ) {
@@ -116,11 +139,15 @@ pub(crate) fn structure(
         structure.model.camera().iter().for_each(|camera| structure.earlier.follow(camera));
     }
     let section = structure.section;
-    // Of a prediction that is not there yet nothing is foretold.
-    let years = moment::years(scene, &latest);
-    let when = if years.is_some() { structure.moment } else { Moment::Now };
-    let seen = when.seen(scene, &latest);
-    let scale = if when == Moment::Added { Scale::ADDED } else { Scale::DAMAGE };
+    // What is cut open, or compared, is not as it looks.
+    let is_lit = structure.is_lit && section.is_none() && history.beside().is_none();
+    let when = *moment;
+    let seen = if is_lit { Vec::new() } else { when.seen(scene, &latest, &courses) };
+    let scale = match (is_lit, when.added && !when.is_now()) {
+        (true, _) => Scale::NONE,
+        (false, true) => Scale::ADDED,
+        (false, false) => Scale::DAMAGE,
+    };
     let rect = match history.beside() {
         None => whole,
         Some(earlier) => {
@@ -139,21 +166,28 @@ pub(crate) fn structure(
     };
     let pointed = structure.model.show(ui, rect, scene, &seen, scale, *selection, section);
     let Some(pointed) = pointed else { return };
+    if is_lit {
+        structure.settling.show(ui, rect, &pointed.camera, &mut light);
+    }
+    model::ruler(ui, rect, &pointed.camera);
     if structure.names {
-        let value = |i: usize| match when {
-            Moment::Now => latest.member(i).map(|p| p.damage.value),
-            Moment::Ahead | Moment::Added => seen.get(i).and_then(Seen::most),
+        let value = |i: usize| match when.is_now() {
+            true => latest.member(i).map(|p| p.damage.value),
+            false => seen.get(i).and_then(Seen::most),
         };
         structure.model.names(ui, rect, scene, &value, *selection, &pointed.camera);
     }
     structure.earlier.follow(&pointed.camera);
     compass::draw(ui, rect, &pointed.camera);
     structure.tape.draw(ui, rect, &pointed.camera);
-    let shown = Shown { latest: &latest, seen: &seen, when, years };
+    let shown = Shown { latest: &latest, seen: &seen, when };
     point(structure, scene, &shown, pointed, form.bypass_change_detection(), &mut actions);
     let bar = Rect::from_min_size(whole.min + vec2(8.0, 8.0), vec2(whole.width() - 16.0, 24.0));
     ui.scope_builder(egui::UiBuilder::new().max_rect(bar), |ui| {
-        ui.vertical(|ui| tools(ui, structure, history, *selection, years, &mut actions));
+        ui.vertical(|ui| {
+            let timeline = &courses.timeline;
+            tools(ui, structure, history, *selection, (&mut moment, timeline), &mut actions);
+        });
     });
 }
 
@@ -170,6 +204,7 @@ fn beside(
     let (seen, section) = (earlier.seen(scene), structure.section);
     let shown = structure.earlier.show(ui, rect, scene, &seen, Scale::DAMAGE, selection, section);
     let Some(pointed) = shown else { return };
+    model::ruler(ui, rect, &pointed.camera);
     structure.model.follow(&pointed.camera);
     if structure.names {
         let value = |i: usize| earlier.member(&scene.members[i].id)?.damage().map(|d| d.value);
@@ -195,22 +230,18 @@ struct Shown<'a> {
     latest: &'a Latest,
     seen: &'a [Seen],
     when: Moment,
-    years: Option<f64>,
 }
 
 impl Shown<'_> {
     /// What is to be said of a place beside how it is now.
     fn later(&self, spot: &Spot) -> String {
         let value = self.seen.get(spot.member).and_then(|s| s.zones[spot.zone]);
-        let (Some(value), Some(years)) = (value, self.years) else { return String::new() };
-        match self.when {
-            Moment::Now => String::new(),
-            Moment::Ahead => {
-                tr!("In {} years: d = {} at least", fixed(years, 0), fixed(value, 2))
-            }
-            Moment::Added => {
-                tr!("{} years add {}, by the forecast", fixed(years, 0), fixed(value, 2))
-            }
+        let Some(value) = value.filter(|_| !self.when.is_now()) else { return String::new() };
+        let (years, value) = (self.when.years, fixed(value, 2));
+        match self.when.added {
+            _ if years < 0.0 => tr!("{} years ago: d = {}, by its life", fixed(-years, 1), value),
+            false => tr!("In {} years: d = {} at least", fixed(years, 1), value),
+            true => tr!("{} years add {}, by the forecast", fixed(years, 1), value),
         }
     }
 }
@@ -255,7 +286,7 @@ fn tools(
     structure: &mut Structure,
     history: &mut History,
     selection: Selection,
-    years: Option<f64>,
+    (moment, timeline): (&mut ResMut<Moment>, &Timeline),
     actions: &mut Actions,
 ) {
     let frame = egui::Frame::popup(ui.style()).inner_margin(4);
@@ -275,10 +306,17 @@ fn tools(
                 structure.tape.clear();
             }
             compared(ui, history, actions);
+            let hint = tr!("Light, as an eye would see it, path-traced once nobody moves it");
+            let lit = ui.toggle_value(&mut structure.is_lit, tr!("As it looks"));
+            if lit.on_hover_text(hint).changed() {
+                structure.settling = Settling::default();
+            }
         });
     });
-    if let Some(years) = years {
-        frame.show(ui, |ui| ui.horizontal(|ui| moments(ui, &mut structure.moment, years)));
+    if timeline.range().is_some() {
+        let mut when = **moment;
+        frame.show(ui, |ui| ui.horizontal(|ui| time::bar(ui, &mut when, timeline)));
+        moment.set_if_neq(when);
     }
     let bounds = structure.model.bounds();
     if let Some(section) = &mut structure.section {
@@ -313,21 +351,6 @@ fn compared(ui: &mut Ui, history: &mut History, actions: &mut Actions) {
          or the predict.json of another day");
     button.response.on_hover_text(hint);
     history.choose(chosen);
-}
-
-/// When it is looked at.
-fn moments(ui: &mut Ui, moment: &mut Moment, years: f64) {
-    let hint = tr!("Damage as it is known now");
-    ui.selectable_value(moment, Moment::Now, tr!("Now")).on_hover_text(hint);
-    let hint = tr!(
-        "What is known now, and more where the forecast says more. Only the end of the forecast \
-         was computed: there is nothing between."
-    );
-    let ahead = tr!("In {} years", fixed(years, 0));
-    ui.selectable_value(moment, Moment::Ahead, ahead).on_hover_text(hint);
-    let hint = tr!("Damage at the end of the forecast less that of now, both by the forecast");
-    let added = tr!("What {} years add", fixed(years, 0));
-    ui.selectable_value(moment, Moment::Added, added).on_hover_text(hint);
 }
 
 fn views(ui: &mut Ui, structure: &mut Structure, selection: Selection, actions: &mut Actions) {

@@ -47,6 +47,8 @@ pub(super) struct Scale {
 impl Scale {
     /// Of damage as it is.
     pub(super) const DAMAGE: Self = Self { name: "damage d", top: 1.0 };
+    /// Of what is not shown by its damage.
+    pub(super) const NONE: Self = Self { name: "", top: 1.0 };
     /// Of what years add, which is less.
     pub(super) const ADDED: Self = Self { name: "d is added", top: 0.4 };
 }
@@ -157,10 +159,9 @@ impl Model {
         let shown = self.shown.as_ref()?;
         let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
         ui.painter().image(shown.texture.id(), rect, whole, Color32::WHITE);
-        if self.of_what == Of::Now {
+        if self.of_what == Of::Now && scale != Scale::NONE {
             legend(ui, rect, scale);
         }
-        ruler(ui, rect, &camera);
         let under = response.hover_pos().and_then(|at| shown.spot(at));
         Some(Pointed { response, under, camera })
     }
@@ -490,7 +491,7 @@ pub(super) fn said(ui: &mut Ui, scene: &Scene, latest: &Latest, spot: &Spot, lat
 }
 
 /// A length in the picture, at the distance of its middle: nearer things are larger.
-fn ruler(ui: &Ui, rect: Rect, camera: &Camera) {
+pub(super) fn ruler(ui: &Ui, rect: Rect, camera: &Camera) {
     let distance = (camera.target - camera.position).length();
     let width = 2.0 * camera.half_extent()[0] * distance;
     let metre = rect.width() / width.max(1e-6);

@@ -59,7 +59,7 @@ impl Section {
         let [from, to] = bounds.map(|b| b.dot(axis));
         let mut level = self.level(bounds);
         ui.spacing_mut().slider_width = 110.0;
-        let slider = Slider::new(&mut level, from..=to).suffix(" m").max_decimals(2);
+        let slider = lang::slide(&mut level, from..=to).suffix(" m").max_decimals(2);
         if ui.add(slider).labelled_by(label.id).changed() && to > from {
             self.share = ((level - from) / (to - from)).clamp(0.0, 1.0);
         }
