@@ -11,7 +11,7 @@ use intrados_scene::{
 };
 
 use crate::{
-    Banners, Log, Look, Quantity, Refine, Selection, Viewpoint, Workspace,
+    Banners, Language, Log, Look, Quantity, Refine, Selection, Viewpoint, Workspace,
     attach::Form,
     command::Palette,
     create::Creation,
@@ -25,7 +25,7 @@ use crate::{
     recent::Recent,
     saving::{Saving, Taken},
     structure::{self, Structure},
-    workspace::Desk,
+    workspace::{self, Desk},
 };
 
 /// Something that a user can ask for by a button, a menu, or a key.
@@ -79,6 +79,8 @@ pub enum Action {
     ResetLayout,
     /// Light, dark, or as the system has it.
     Theme(egui::ThemePreference),
+    /// Speak a language.
+    Speak(Language),
     /// Fill the screen, or no more.
     Fullscreen,
     /// Close the window.
@@ -151,6 +153,8 @@ impl Actions {
 
 /// Carries out what was asked for.
 pub(crate) fn act(world: &mut World) {
+    // What is said before the first frame is drawn is said in it, too.
+    workspace::speak(world);
     for action in std::mem::take(&mut world.resource_mut::<Actions>().0) {
         carry_out(world, action);
     }
@@ -177,9 +181,10 @@ fn carry_out(world: &mut World, action: Action) {
         Action::TakePicture(path, panel) => {
             let of = panel.map(|panel| world.resource::<Desk>().place(&panel));
             match of {
-                Some(None) => world
-                    .resource_mut::<Banners>()
-                    .cannot("No picture", "this panel is not in sight: bring it to the front"),
+                Some(None) => world.resource_mut::<Banners>().cannot(
+                    &tr!("No picture"),
+                    &tr!("this panel is not in sight: bring it to the front"),
+                ),
                 of => world.resource_mut::<Saving>().take_picture(path, of.flatten()),
             }
         }
@@ -242,6 +247,7 @@ fn carry_out(world: &mut World, action: Action) {
         }
         Action::ResetLayout => world.resource_mut::<Desk>().reset(),
         Action::Theme(theme) => world.resource_mut::<Desk>().dress(theme),
+        Action::Speak(language) => world.resource_mut::<Desk>().speak(language),
         Action::Fullscreen => world.resource_mut::<Layout>().toggle_fullscreen(),
         Action::Quit => world.resource_mut::<Layout>().quits = true,
         Action::Slice(index) => {
@@ -289,9 +295,10 @@ fn fill(world: &mut World, files: Vec<PathBuf>, place: Option<(f32, Option<Face>
                 form.put_at(along, face);
             }
         }
-        None => world
-            .resource_mut::<Banners>()
-            .cannot("Attached to which member?", "select one first, in the picture or in the list"),
+        None => world.resource_mut::<Banners>().cannot(
+            &tr!("Attached to which member?"),
+            &tr!("select one first, in the picture or in the list"),
+        ),
     }
 }
 
@@ -301,7 +308,10 @@ fn compare(world: &mut World, path: &Path) {
     let opened = world.resource_mut::<History>().open(path, &scene);
     match opened {
         Ok(()) => show_tab(world, "Structure"),
-        Err(why) => world.resource_mut::<Banners>().cannot("No prediction to compare with", &why),
+        Err(why) => {
+            let title = tr!("No prediction to compare with");
+            world.resource_mut::<Banners>().cannot(&title, &why);
+        }
     }
 }
 
@@ -322,7 +332,7 @@ fn step(world: &mut World, forward: bool) {
 
 fn open(world: &mut World, path: PathBuf) {
     world.resource_mut::<Banners>().clear();
-    world.resource_mut::<Log>().say(format!("opening {}", path.display()));
+    world.resource_mut::<Log>().say(tr!("opening {}|log", path.display()));
     world.resource_mut::<Layout>().asked = Some(path.clone());
     world.write_message(OpenScene(path));
 }

@@ -5,7 +5,7 @@ use egui::{Panel as Side, Ui};
 use intrados_scene::LoadError;
 use intrados_stage::{Fault, Jobs};
 
-use crate::{Action, Actions, Log};
+use crate::{Action, Actions, Log, lang::term};
 
 /// So many at once; of more, the oldest go. The log has them all.
 const MOST: usize = 3;
@@ -31,7 +31,7 @@ impl Banners {
     pub(crate) fn not_opened(&mut self, error: &LoadError) {
         let problems: Vec<String> = error.problems().iter().map(ToString::to_string).collect();
         self.put(Banner {
-            title: "Not opened".into(),
+            title: tr!("Not opened"),
             text: error.to_string(),
             details: problems.join("\n"),
             reload: false,
@@ -86,7 +86,8 @@ impl Banners {
 /// Says that something of the program's own broke, above the window and in the log; what breaks in
 /// every frame is said once.
 pub(crate) fn tell(banners: &mut Banners, log: &mut Log, what: &str, fault: &Fault) {
-    let line = format!("⚠ {what}: {fault} ({})", fault.place.as_deref().unwrap_or("unknown place"));
+    let place = fault.place.clone().unwrap_or_else(|| tr!("unknown place"));
+    let line = format!("⚠ {what}: {fault} ({place})");
     if log.lines().last() != Some(&line) {
         tracing::error!("{line}");
         log.say(line);
@@ -97,7 +98,7 @@ pub(crate) fn tell(banners: &mut Banners, log: &mut Log, what: &str, fault: &Fau
 /// Work off the frame that broke off.
 pub(crate) fn gather(mut jobs: ResMut<Jobs>, mut banners: ResMut<Banners>, mut log: ResMut<Log>) {
     for (label, fault) in jobs.bypass_change_detection().take_faults() {
-        tell(&mut banners, &mut log, &format!("“{label}” broke off"), &fault);
+        tell(&mut banners, &mut log, &tr!("“{}” broke off", term(&label)), &fault);
     }
 }
 
@@ -112,20 +113,20 @@ pub(crate) fn show(ui: &mut Ui, world: &mut World) {
                 ui.label(&banner.text);
                 if banner.reload
                     && ui
-                        .button("Reload scene")
-                        .on_hover_text("Begins anew; the log stays")
+                        .button(tr!("Reload scene"))
+                        .on_hover_text(tr!("Begins anew; the log stays"))
                         .clicked()
                 {
                     asked.push(Action::Reload);
                 }
-                if ui.button("Copy details").clicked() {
+                if ui.button(tr!("Copy details")).clicked() {
                     ui.ctx().copy_text(format!(
                         "Intrados {}\n{}",
                         env!("CARGO_PKG_VERSION"),
                         banner.details
                     ));
                 }
-                if ui.button("Dismiss").clicked() {
+                if ui.button(tr!("Dismiss")).clicked() {
                     world.resource_mut::<Banners>().0.retain(|b| b != banner);
                 }
             });

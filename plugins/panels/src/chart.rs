@@ -45,7 +45,7 @@ pub(crate) fn by_cpu_seconds<'a>(id: &str) -> Plot<'a> {
         .y_axis_formatter(|mark, _| power(mark))
         .label_formatter(|hover| {
             let p = place(hover);
-            Some(format!(
+            Some(tr!(
                 "{} after {} CPU-s",
                 significant(10_f64.powf(p.y), 2),
                 significant(10_f64.powf(p.x), 2)

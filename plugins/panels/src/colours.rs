@@ -6,6 +6,8 @@ use egui::{Color32, ecolor::gamma_u8_from_linear_f32 as srgb};
 use intrados_damage::verdict::{Basis, Verdict};
 use intrados_report::surface;
 
+use crate::lang::term;
+
 /// Primal: blue of Okabe & Ito's palette, told apart from vermilion by every kind of colour vision.
 pub(crate) const PRIMAL: Color32 = Color32::from_rgb(0, 114, 178);
 /// Dual: vermilion.
@@ -73,7 +75,7 @@ pub(crate) fn severity(ui: &mut egui::Ui, verdict: &Verdict, steps: usize) -> eg
             );
         }
     }
-    response.on_hover_text(&verdict.state)
+    response.on_hover_text(term(&verdict.state))
 }
 
 fn lerp(a: Color32, b: Color32, t: f32) -> Color32 {

@@ -7,8 +7,13 @@ use intrados_light::View;
 use intrados_scene::plugin::CurrentScene;
 
 use crate::{
-    Action, Actions, Look, Quantity, Workspace, layout::Layout, place::Panels, recent::Recent,
-    saving::Taken, workspace::Desk,
+    Action, Actions, Language, Look, Quantity, Workspace,
+    lang::{self, term},
+    layout::Layout,
+    place::Panels,
+    recent::Recent,
+    saving::Taken,
+    workspace::Desk,
 };
 
 /// Something with a name that a user can ask for.
@@ -22,14 +27,16 @@ pub(crate) struct Command {
 }
 
 /// What the pointer does, for the sheet of keys.
-const GESTURES: [(&str, &str); 6] = [
-    ("Drag", "orbit"),
-    ("Shift+drag, middle or right drag", "pan"),
-    ("Wheel", "nearer, farther"),
-    ("Click", "select a member"),
-    ("Double-click", "look at a member"),
-    ("Drag a tab", "dock a panel elsewhere"),
-];
+fn gestures() -> [(String, String); 6] {
+    [
+        (tr!("Drag"), tr!("orbit")),
+        (tr!("Shift+drag, middle or right drag"), tr!("pan")),
+        (tr!("Wheel"), tr!("nearer, farther")),
+        (tr!("Click"), tr!("select a member")),
+        (tr!("Double-click"), tr!("look at a member")),
+        (tr!("Drag a tab"), tr!("dock a panel elsewhere")),
+    ]
+}
 
 /// The palette: what has been typed, and which line is chosen.
 #[derive(Resource, Default)]
@@ -63,66 +70,74 @@ fn fixed(look: &Look) -> Vec<Command> {
     let quantity = if is_error { Quantity::Radiance } else { Quantity::Error };
     let by = |modifiers: Modifiers, key: Key| Some((modifiers, key));
     vec![
-        command("new structure", "Ctrl+N", by(CTRL, Key::N), Action::New),
-        command("open a file", "Ctrl+O", by(CTRL, Key::O), Action::Choose),
-        command("save the report", "Ctrl+S", by(CTRL, Key::S), Action::Save(Taken::Report)),
-        command("save the picture of light", "Ctrl+E", by(CTRL, Key::E), Action::Export),
+        command(tr!("new structure"), "Ctrl+N", by(CTRL, Key::N), Action::New),
+        command(tr!("open a file"), "Ctrl+O", by(CTRL, Key::O), Action::Choose),
+        command(tr!("save the report"), "Ctrl+S", by(CTRL, Key::S), Action::Save(Taken::Report)),
+        command(tr!("save the picture of light"), "Ctrl+E", by(CTRL, Key::E), Action::Export),
         command(
-            "save a picture of the window",
+            tr!("save a picture of the window"),
             "F12",
             by(NONE, Key::F12),
             Action::Save(Taken::Picture(None)),
         ),
         command(
-            "save a picture of the structure, with its legend",
+            tr!("save a picture of the structure, with its legend"),
             "",
             None,
             Action::Save(Taken::Picture(Some("Structure".into()))),
         ),
-        command("attach evidence", "A", by(NONE, Key::A), Action::Fill(Vec::new(), None)),
+        command(tr!("attach evidence"), "A", by(NONE, Key::A), Action::Fill(Vec::new(), None)),
         // Before the one that asks for less: Ctrl+Z alone would take Shift along.
-        command("redo", "Ctrl+Shift+Z  Ctrl+Y", by(shifted, Key::Z), Action::Redo),
-        command("undo", "Ctrl+Z", by(CTRL, Key::Z), Action::Undo),
+        command(tr!("redo"), "Ctrl+Shift+Z  Ctrl+Y", by(shifted, Key::Z), Action::Redo),
+        command(tr!("undo"), "Ctrl+Z", by(CTRL, Key::Z), Action::Undo),
         command("", "", by(CTRL, Key::Y), Action::Redo),
-        command("list all commands", "Ctrl+P  Ctrl+K", by(CTRL, Key::P), Action::Palette),
-        command("list of keys", "F1  ?", by(NONE, Key::F1), Action::Keys),
-        command("inspector's or expert's layout", "F9", by(NONE, Key::F9), Action::SwapWorkspace),
-        command("lay panels out as at first", "", None, Action::ResetLayout),
-        command("next member", "Page down", by(NONE, Key::PageDown), Action::Step(true)),
-        command("previous member", "Page up", by(NONE, Key::PageUp), Action::Step(false)),
+        command(tr!("list all commands"), "Ctrl+P  Ctrl+K", by(CTRL, Key::P), Action::Palette),
+        command(tr!("list of keys"), "F1  ?", by(NONE, Key::F1), Action::Keys),
         command(
-            "fit the selected member, or everything, into the picture",
+            tr!("inspector's or expert's layout"),
+            "F9",
+            by(NONE, Key::F9),
+            Action::SwapWorkspace,
+        ),
+        command(tr!("lay panels out as at first"), "", None, Action::ResetLayout),
+        command(tr!("next member"), "Page down", by(NONE, Key::PageDown), Action::Step(true)),
+        command(tr!("previous member"), "Page up", by(NONE, Key::PageUp), Action::Step(false)),
+        command(
+            tr!("fit the selected member, or everything, into the picture"),
             "F",
             by(NONE, Key::F),
             Action::Frame,
         ),
         command(
-            "all of it, from the scene's own camera",
+            tr!("all of it, from the scene's own camera"),
             "Home",
             by(NONE, Key::Home),
             Action::Home,
         ),
-        command("pause or continue", "Space", by(NONE, Key::Space), Action::Pause),
-        command("restart the picture", "R", by(NONE, Key::R), Action::Restart),
-        command("primal side", "1", by(NONE, Key::Num1), Action::Show(View::Primal)),
-        command("dual side", "2", by(NONE, Key::Num2), Action::Show(View::Dual)),
-        command("both sides combined", "3", by(NONE, Key::Num3), Action::Show(View::Combined)),
-        command("light or error", "E", by(NONE, Key::E), Action::ShowQuantity(quantity)),
-        command("go on with the prediction", "", None, Action::Predict),
-        command("compare with an earlier prediction", "", None, Action::ChoosePrediction),
-        command("reload the scene", "", None, Action::Reload),
-        command("start screen", "", None, Action::StartScreen(true)),
-        command("light theme", "", None, Action::Theme(egui::ThemePreference::Light)),
-        command("dark theme", "", None, Action::Theme(egui::ThemePreference::Dark)),
-        command("theme of the system", "", None, Action::Theme(egui::ThemePreference::System)),
-        command("full screen", "F11", by(NONE, Key::F11), Action::Fullscreen),
+        command(tr!("pause or continue"), "Space", by(NONE, Key::Space), Action::Pause),
+        command(tr!("restart the picture"), "R", by(NONE, Key::R), Action::Restart),
+        command(tr!("primal side"), "1", by(NONE, Key::Num1), Action::Show(View::Primal)),
+        command(tr!("dual side"), "2", by(NONE, Key::Num2), Action::Show(View::Dual)),
+        command(tr!("both sides combined"), "3", by(NONE, Key::Num3), Action::Show(View::Combined)),
+        command(tr!("light or error"), "E", by(NONE, Key::E), Action::ShowQuantity(quantity)),
+        command(tr!("go on with the prediction"), "", None, Action::Predict),
+        command(tr!("compare with an earlier prediction"), "", None, Action::ChoosePrediction),
+        command(tr!("reload the scene"), "", None, Action::Reload),
+        command(tr!("start screen"), "", None, Action::StartScreen(true)),
+        command(tr!("light theme"), "", None, Action::Theme(egui::ThemePreference::Light)),
+        command(tr!("dark theme"), "", None, Action::Theme(egui::ThemePreference::Dark)),
+        command(tr!("theme of the system"), "", None, Action::Theme(egui::ThemePreference::System)),
+        command("Language: English", "", None, Action::Speak(Language::English)),
+        command("Sprache: Deutsch", "", None, Action::Speak(Language::German)),
+        command("语言：中文", "", None, Action::Speak(Language::Chinese)),
+        command(tr!("full screen"), "F11", by(NONE, Key::F11), Action::Fullscreen),
         command(
-            "put away a sheet or a message, or unselect",
+            tr!("put away a sheet or a message, or unselect"),
             "Esc",
             by(NONE, Key::Escape),
             Action::Dismiss,
         ),
-        command("quit", "Ctrl+Q", by(CTRL, Key::Q), Action::Quit),
+        command(tr!("quit"), "Ctrl+Q", by(CTRL, Key::Q), Action::Quit),
         command("", "", by(CTRL, Key::K), Action::Palette),
         command("", "", by(NONE, Key::Questionmark), Action::Keys),
         command("", "", by(shifted, Key::P), Action::Palette),
@@ -134,28 +149,40 @@ fn all(world: &World) -> Vec<Command> {
     let mut all = fixed(world.resource::<Look>());
     all.retain(|c| !c.name.is_empty());
     for workspace in Workspace::BOTH {
-        let name = format!("layout: {}", workspace.name());
+        let name = match workspace {
+            Workspace::Inspector => tr!("layout: Inspector"),
+            Workspace::Expert => tr!("layout: Expert"),
+        };
         all.push(command(name, "", None, Action::Arrange(workspace)));
     }
     for panel in &world.resource::<Panels>().0 {
         let action = Action::Panel(panel.name.clone(), true);
-        all.push(command(format!("panel: {}", panel.name), "", None, action));
+        all.push(command(tr!("panel: {}", term(&panel.name)), "", None, action));
     }
     if let Some(scene) = world.get_resource::<CurrentScene>() {
         for (index, member) in scene.0.members.iter().enumerate() {
-            let name = format!("member: {}", member.name);
+            let name = tr!("member: {}", member.name);
             all.push(command(name, "", None, Action::Select(Some(index))));
         }
         for (index, camera) in scene.0.cameras.iter().enumerate() {
-            let name = format!("camera: {}", camera.name);
+            let name = tr!("camera: {}", camera.name);
             all.push(command(name, "", None, Action::Camera(index)));
         }
     }
     for path in world.resource::<Recent>().list() {
-        let name = format!("open {}", path.display());
+        let name = tr!("open {}", path.display());
         all.push(command(name, "", None, Action::Open(path.clone())));
     }
     all
+}
+
+/// What `make` makes, in English.
+fn in_english<T>(make: impl FnOnce() -> T) -> T {
+    let spoken = lang::spoken();
+    lang::speak(Language::English);
+    let made = make();
+    lang::speak(spoken);
+    made
 }
 
 /// Puts what keys ask for into the actions. A field that has the focus keeps its letters; keys with
@@ -195,11 +222,11 @@ pub(crate) fn sheet(ui: &Ui, world: &mut World) {
     if !open {
         return;
     }
-    let commands = fixed(world.resource::<Look>());
-    let rows = commands.iter().map(|c| (c.keys, c.name.as_str()));
-    let rows: Vec<(&str, &str)> = rows.filter(|(keys, _)| !keys.is_empty()).collect();
+    let commands = fixed(world.resource::<Look>()).into_iter().filter(|c| !c.keys.is_empty());
+    let rows: Vec<(String, String)> =
+        commands.map(|c| (c.keys.to_owned(), c.name)).chain(gestures()).collect();
     let height = (ui.ctx().content_rect().height() - 80.0).max(80.0);
-    egui::Window::new("Keys")
+    egui::Window::new(tr!("Keys"))
         .collapsible(false)
         .resizable(false)
         .anchor(egui::Align2::CENTER_CENTER, [0.0, 0.0])
@@ -207,9 +234,9 @@ pub(crate) fn sheet(ui: &Ui, world: &mut World) {
         .show(ui.ctx(), |ui| {
             ScrollArea::vertical().max_height(height).show(ui, |ui| {
                 egui::Grid::new("keys").num_columns(2).striped(true).show(ui, |ui| {
-                    for (keys, what) in rows.iter().chain(&GESTURES) {
-                        ui.strong(*keys);
-                        ui.label(*what);
+                    for (keys, what) in &rows {
+                        ui.strong(keys);
+                        ui.label(what);
                         ui.end_row();
                     }
                 });
@@ -225,7 +252,8 @@ pub(crate) fn palette(ui: &Ui, world: &mut World) {
     }
     let mut palette = std::mem::take(&mut *world.resource_mut::<Palette>());
     let commands = all(world);
-    let fits = fitting(&commands, &palette.query);
+    let english = in_english(|| all(world));
+    let fits = fitting(&commands, &english, &palette.query);
     let count = fits.len();
     let (mut chosen, mut done) = (None, false);
     ui.input_mut(|i| {
@@ -242,18 +270,19 @@ pub(crate) fn palette(ui: &Ui, world: &mut World) {
     });
     let screen = ui.ctx().content_rect();
     let width = (screen.width() - 40.0).min(560.0);
-    egui::Window::new("Commands")
+    egui::Window::new(tr!("Commands"))
         .title_bar(false)
         .resizable(false)
         .fixed_size([width, 0.0])
         .anchor(egui::Align2::CENTER_TOP, [0.0, 48.0])
         .show(ui.ctx(), |ui| {
             let field = TextEdit::singleline(&mut palette.query)
-                .hint_text("Type what you want to do")
+                .hint_text(tr!("Type what you want to do"))
                 .desired_width(f32::INFINITY);
             let response = ui.add(field);
-            response
-                .widget_info(|| egui::WidgetInfo::labeled(egui::Role::TextInput, true, "Command"));
+            response.widget_info(|| {
+                egui::WidgetInfo::labeled(egui::Role::TextInput, true, tr!("Command"))
+            });
             response.request_focus();
             if response.changed() {
                 palette.chosen = 0;
@@ -271,7 +300,7 @@ pub(crate) fn palette(ui: &Ui, world: &mut World) {
                     }
                 }
                 if fits.is_empty() {
-                    ui.weak("No command is called so.");
+                    ui.weak(tr!("No command is called so."));
                 }
             });
         });
@@ -293,14 +322,17 @@ fn row(ui: &mut Ui, command: &Command, is_chosen: bool) -> egui::Response {
     ui.add_sized([width, 22.0], button.min_size(egui::vec2(width, 22.0)))
 }
 
-/// Those whose names have every word that was typed; those that begin with it first.
-fn fitting(commands: &[Command], query: &str) -> Vec<usize> {
+/// Those whose names have every word that was typed, in the language of the window or in English;
+/// those that begin with it first.
+fn fitting(commands: &[Command], english: &[Command], query: &str) -> Vec<usize> {
     let query = query.trim().to_lowercase();
     let words: Vec<&str> = query.split_whitespace().collect();
-    let names: Vec<String> = commands.iter().map(|c| c.name.to_lowercase()).collect();
-    let has_all = |i: &usize| words.iter().all(|w| names[*i].contains(w));
+    let lower = |c: &Command| c.name.to_lowercase();
+    let names: Vec<[String; 2]> =
+        commands.iter().zip(english).map(|(own, english)| [lower(own), lower(english)]).collect();
+    let has_all = |i: &usize| names[*i].iter().any(|name| words.iter().all(|w| name.contains(w)));
     let mut fits: Vec<usize> = (0..commands.len()).filter(has_all).collect();
-    fits.sort_by_key(|&i| !names[i].starts_with(&query));
+    fits.sort_by_key(|&i| !names[i].iter().any(|name| name.starts_with(&query)));
     fits
 }
 
@@ -317,12 +349,24 @@ mod tests {
     fn commands_are_found_by_any_of_their_words() {
         let commands = fixed(&Look::default());
         let name = |query: &str| {
-            let fits = fitting(&commands, query);
+            let fits = fitting(&commands, &commands, query);
             commands[fits[0]].name.clone()
         };
         assert_eq!(name("full"), "full screen");
         assert_eq!(name("MEMBER next"), "next member");
-        assert!(fitting(&commands, "no such thing").is_empty());
+        assert!(fitting(&commands, &commands, "no such thing").is_empty());
+    }
+
+    #[test]
+    fn commands_are_found_by_their_names_in_the_language_of_the_window_and_in_english() {
+        lang::speak(Language::German);
+        let commands = fixed(&Look::default());
+        let english = in_english(|| fixed(&Look::default()));
+        let first = |query: &str| fitting(&commands, &english, query).first().copied();
+        assert_eq!(first("vollbild"), first("full screen"));
+        assert_eq!(first("vollbild").map(|i| &*english[i].name), Some("full screen"));
+        assert!(first("语言").is_some());
+        lang::speak(Language::English);
     }
 
     #[test]

@@ -8,12 +8,13 @@ use crate::{
     Refine, Statistics,
     chart::{by_cpu_seconds, decades, key, place, plot, power},
     colours,
+    lang::local,
     number::significant,
 };
 
 pub(crate) fn convergence(InMut(ui): InMut<Ui>, statistics: Res<Statistics>, refine: Res<Refine>) {
     if statistics.history().len() < 2 {
-        ui.weak("The plot begins with the second reading.");
+        ui.weak(tr!("The plot begins with the second reading."));
         return;
     }
     ui.columns(2, |columns| {
@@ -25,30 +26,30 @@ pub(crate) fn convergence(InMut(ui): InMut<Ui>, statistics: Res<Statistics>, ref
 /// log₁₀ of the relative error against log₁₀ of CPU-seconds: a straight line of slope −½ where the
 /// 1/√n law holds.
 fn errors(ui: &mut Ui, statistics: &Statistics, target: f64) {
-    let line = |name: &str, k: usize, colour, style| {
+    let line = |name: String, k: usize, colour, style| {
         let points: Vec<[f64; 2]> = statistics
             .history()
             .iter()
             .filter_map(|e| Some([e.cpu_seconds.log10(), e.errors[k]?.log10()]))
             .collect();
-        Line::new(name.to_owned(), PlotPoints::new(points)).color(colour).style(style).width(2.0)
+        Line::new(name, PlotPoints::new(points)).color(colour).style(style).width(2.0)
     };
     ui.horizontal(|ui| {
-        ui.label("Relative error of the picture's mean against CPU-seconds");
+        ui.label(tr!("Relative error of the picture's mean against CPU-seconds"));
         for (name, colour, dashed) in [
-            ("primal", colours::PRIMAL, false),
-            ("dual", colours::DUAL, true),
-            ("combined", colours::COMBINED, false),
+            (tr!("primal"), colours::PRIMAL, false),
+            (tr!("dual"), colours::DUAL, true),
+            (tr!("combined"), colours::COMBINED, false),
         ] {
-            key(ui, name, colour, dashed);
+            key(ui, &name, colour, dashed);
         }
     });
     by_cpu_seconds("errors").include_y(target.log10()).show(ui, |plot| {
-        plot.line(line("primal", 0, colours::PRIMAL, LineStyle::Solid).width(4.0));
-        plot.line(line("dual", 1, colours::DUAL, LineStyle::dashed_loose()));
-        plot.line(line("combined", 2, colours::COMBINED, LineStyle::Solid));
+        plot.line(line(tr!("primal"), 0, colours::PRIMAL, LineStyle::Solid).width(4.0));
+        plot.line(line(tr!("dual"), 1, colours::DUAL, LineStyle::dashed_loose()));
+        plot.line(line(tr!("combined"), 2, colours::COMBINED, LineStyle::Solid));
         plot.hline(
-            HLine::new("target", target.log10())
+            HLine::new(tr!("target"), target.log10())
                 .color(colours::UNKNOWN)
                 .style(LineStyle::dotted_dense()),
         );
@@ -59,7 +60,7 @@ fn errors(ui: &mut Ui, statistics: &Statistics, target: f64) {
 fn gap(ui: &mut Ui, statistics: &Statistics) {
     let points: Vec<[f64; 2]> =
         statistics.history().iter().filter_map(|e| Some([e.cpu_seconds.log10(), e.z?])).collect();
-    ui.label("Duality gap against CPU-seconds, in standard errors (dotted: 95 %)");
+    ui.label(tr!("Duality gap against CPU-seconds, in standard errors (dotted: 95 %)"));
     plot("gap")
         .x_grid_spacer(decades)
         .x_axis_formatter(|mark, _| power(mark))
@@ -67,7 +68,8 @@ fn gap(ui: &mut Ui, statistics: &Statistics) {
         .include_y(3.0)
         .label_formatter(|hover| {
             let p = place(hover);
-            Some(format!("{:+.2} σ after {} CPU-s", p.y, significant(10_f64.powf(p.x), 2)))
+            let gap = local(format!("{:+.2}", p.y));
+            Some(tr!("{} σ after {} CPU-s", gap, significant(10_f64.powf(p.x), 2)))
         })
         .show(ui, |plot| {
             for z in [-2.0, 2.0] {
@@ -76,7 +78,7 @@ fn gap(ui: &mut Ui, statistics: &Statistics) {
                 );
             }
             plot.line(
-                Line::new("primal − dual", PlotPoints::new(points))
+                Line::new(tr!("primal − dual"), PlotPoints::new(points))
                     .color(colours::PRIMAL)
                     .width(2.0),
             );

@@ -8,7 +8,7 @@ use egui::{Button, ScrollArea, TextEdit, Ui, vec2};
 use intrados_scene::attach::{Draft, Setting};
 use intrados_stage::{Jobs, Task};
 
-use crate::{Action, Actions, structure::Preview, values::Values};
+use crate::{Action, Actions, lang::fixed, structure::Preview, values::Values};
 
 /// What it takes of the window at most, points.
 const SIZE: (f32, f32) = (860.0, 560.0);
@@ -72,7 +72,7 @@ impl Creation {
         }
         self.tried = Some(settings.clone());
         let kind = self.kind;
-        self.drafting = Some(Task::spawn_unlisted(jobs, "drafting", move |job| {
+        self.drafting = Some(Task::spawn_unlisted(jobs, tr!("drafting"), move |job| {
             Draft::new(kind, &settings, job).map_err(|why| why.to_string())
         }));
     }
@@ -80,7 +80,7 @@ impl Creation {
     fn make(&mut self, jobs: &mut Jobs) {
         let Some(draft) = self.draft.clone() else { return };
         let folder = PathBuf::from(self.folder.trim());
-        self.making = Some(Task::spawn(jobs, "making the structure", move |_| {
+        self.making = Some(Task::spawn(jobs, tr!("making the structure"), move |_| {
             draft.write(&folder).map_err(|why| why.to_string())
         }));
     }
@@ -125,7 +125,8 @@ pub(crate) fn dialog(InMut(ui): InMut<Ui>, mut creation: ResMut<Creation>, mut j
     let size = vec2((screen.width() - 60.0).min(SIZE.0), (screen.height() - 70.0).min(SIZE.1));
     ui.set_width(size.x);
     ui.horizontal_wrapped(|ui| {
-        for (kind, name) in Draft::KINDS.into_iter().zip(["A column", "A beam", "A tunnel"]) {
+        let names = [tr!("A column"), tr!("A beam"), tr!("A tunnel")];
+        for (kind, name) in Draft::KINDS.into_iter().zip(names) {
             if ui.selectable_label(creation.kind == kind, name).clicked() && creation.kind != kind {
                 creation.choose(kind);
             }
@@ -162,7 +163,7 @@ pub(crate) fn dialog(InMut(ui): InMut<Ui>, mut creation: ResMut<Creation>, mut j
 /// Where it goes, the buttons, and what keeps them from being pressed.
 fn send(ui: &mut Ui, creation: &mut Creation, jobs: &mut Jobs) {
     ui.horizontal(|ui| {
-        let label = ui.label("Folder to make");
+        let label = ui.label(tr!("Folder to make"));
         let width = (ui.available_width() - 12.0).max(80.0);
         let field = TextEdit::singleline(&mut creation.folder).desired_width(width);
         ui.add(field).labelled_by(label.id);
@@ -171,17 +172,17 @@ fn send(ui: &mut Ui, creation: &mut Creation, jobs: &mut Jobs) {
     let is_current = !creation.is_busy() && creation.why.is_empty() && creation.draft.is_some();
     ui.horizontal_wrapped(|ui| {
         let may = is_current && !is_there && !creation.folder.trim().is_empty();
-        let hint = "Makes the folder, with scene.ron and evidence.ron in it, and opens it";
-        if ui.add_enabled(may, Button::new("Make it")).on_hover_text(hint).clicked() {
+        let hint = tr!("Makes the folder, with scene.ron and evidence.ron in it, and opens it");
+        if ui.add_enabled(may, Button::new(tr!("Make it"))).on_hover_text(hint).clicked() {
             creation.make(jobs);
         }
-        if ui.button("Cancel").clicked() {
+        if ui.button(tr!("Cancel")).clicked() {
             creation.is_open = false;
         }
         if !creation.why.is_empty() {
             ui.label(format!("⚠ {}", creation.why));
         } else if is_there {
-            ui.label("⚠ This folder is there already: choose another.");
+            ui.label(tr!("⚠ This folder is there already: choose another."));
         } else if let Some(draft) = &creation.draft {
             ui.weak(measures(draft));
         }
@@ -193,6 +194,6 @@ fn measures(draft: &Draft) -> String {
     let members = &draft.scene.members;
     let volume: f64 = members.iter().map(|m| m.volume).sum();
     let count = members.len();
-    let of = if count == 1 { "one member".to_owned() } else { format!("{count} members") };
-    format!("{of}, {volume:.2} m³ of concrete, {:.1} t", 2.5 * volume)
+    let of = if count == 1 { tr!("one member") } else { tr!("{} members", count) };
+    tr!("{}, {} m³ of concrete, {} t", of, fixed(volume, 2), fixed(2.5 * volume, 1))
 }

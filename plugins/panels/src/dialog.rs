@@ -40,6 +40,37 @@ pub(crate) enum Purpose {
     Take(String),
 }
 
+impl Purpose {
+    /// The system's dialog, in the language of the window.
+    fn dialog(&self) -> rfd::FileDialog {
+        let dialog = rfd::FileDialog::new();
+        let all = tr!("All files");
+        match self {
+            Self::Open => dialog
+                .set_title(tr!("Open a scene"))
+                .add_filter(tr!("Scenes and models"), &["ron", "glb", "gltf", "ifc"])
+                .add_filter(all, &["*"]),
+            Self::Photograph => dialog
+                .set_title(tr!("Open a photograph"))
+                .add_filter(tr!("Photographs"), PHOTOGRAPHS)
+                .add_filter(all, &["*"]),
+            Self::Evidence => dialog
+                .set_title(tr!("Attach CT slices or a table"))
+                .add_filter(tr!("Slices and tables"), EVIDENCE)
+                .add_filter(all, &["*"]),
+            Self::Prediction => dialog
+                .set_title(tr!("Open an earlier prediction"))
+                .add_filter("predict.json", &["json"]),
+            Self::Save(name) => dialog
+                .set_title(tr!("Export the picture"))
+                .add_filter(tr!("PNG, as shown"), &["png"])
+                .add_filter(tr!("EXR, with all data"), &["exr"])
+                .set_file_name(name),
+            Self::Take(name) => dialog.set_title(tr!("Save")).set_file_name(name),
+        }
+    }
+}
+
 /// The dialog that is open, if one is.
 #[derive(Resource)]
 pub(crate) struct Dialogs {
@@ -63,45 +94,16 @@ impl Dialogs {
             *world.resource_mut::<Log>() = log;
             return;
         }
-        let theirs = purpose.clone();
+        let (theirs, dialog) = (purpose.clone(), purpose.dialog());
+        let mut jobs = world.resource_mut::<Jobs>();
         // Not in the list of jobs: it waits for the user, not the other way round.
-        let task =
-            Task::spawn_unlisted(&mut world.resource_mut::<Jobs>(), "file dialog", move |_| {
-                let chosen = match theirs {
-                    Purpose::Evidence => {
-                        return rfd::FileDialog::new()
-                            .set_title("Attach CT slices or a table")
-                            .add_filter("Slices and tables", EVIDENCE)
-                            .add_filter("All files", &["*"])
-                            .pick_files()
-                            .unwrap_or_default();
-                    }
-                    Purpose::Open => rfd::FileDialog::new()
-                        .set_title("Open a scene")
-                        .add_filter("Scenes and models", &["ron", "glb", "gltf", "ifc"])
-                        .add_filter("All files", &["*"])
-                        .pick_file(),
-                    Purpose::Take(name) => {
-                        rfd::FileDialog::new().set_title("Save").set_file_name(name).save_file()
-                    }
-                    Purpose::Photograph => rfd::FileDialog::new()
-                        .set_title("Open a photograph")
-                        .add_filter("Photographs", PHOTOGRAPHS)
-                        .add_filter("All files", &["*"])
-                        .pick_file(),
-                    Purpose::Prediction => rfd::FileDialog::new()
-                        .set_title("Open an earlier prediction")
-                        .add_filter("predict.json", &["json"])
-                        .pick_file(),
-                    Purpose::Save(name) => rfd::FileDialog::new()
-                        .set_title("Export the picture")
-                        .add_filter("PNG, as shown", &["png"])
-                        .add_filter("EXR, with all data", &["exr"])
-                        .set_file_name(name)
-                        .save_file(),
-                };
-                chosen.into_iter().collect()
-            });
+        let task = Task::spawn_unlisted(&mut jobs, tr!("file dialog"), move |_| match theirs {
+            Purpose::Evidence => dialog.pick_files().unwrap_or_default(),
+            Purpose::Save(_) | Purpose::Take(_) => dialog.save_file().into_iter().collect(),
+            Purpose::Open | Purpose::Photograph | Purpose::Prediction => {
+                dialog.pick_file().into_iter().collect()
+            }
+        });
         world.resource_mut::<Self>().open = Some((purpose, Instant::now(), task));
     }
 
@@ -128,16 +130,17 @@ fn is_offered() -> bool {
 /// Says so, and what to do instead.
 fn is_missing(purpose: &Purpose, banners: &mut Banners, log: &mut Log) {
     let instead = match purpose {
-        Purpose::Open => {
-            "start with `intrados view FILE`, drop the file on the window, or type its path on the start screen"
-        }
-        Purpose::Evidence => "drop the files on the window, or type their path",
-        Purpose::Photograph => "drop the photograph on the window, or type its path",
-        Purpose::Prediction => "drop its predict.json on the window",
-        Purpose::Save(_) | Purpose::Take(_) => "type the file's name instead",
+        Purpose::Open => tr!(
+            "start with `intrados view FILE`, drop the file on the window, or type its path on the \
+             start screen"
+        ),
+        Purpose::Evidence => tr!("drop the files on the window, or type their path"),
+        Purpose::Photograph => tr!("drop the photograph on the window, or type its path"),
+        Purpose::Prediction => tr!("drop its predict.json on the window"),
+        Purpose::Save(_) | Purpose::Take(_) => tr!("type the file's name instead"),
     };
-    log.say(format!("no file dialog on this system: {instead}"));
-    banners.cannot("No file dialog on this system", instead);
+    log.say(tr!("no file dialog on this system: {}", instead));
+    banners.cannot(&tr!("No file dialog on this system"), &instead);
 }
 
 /// Takes what a dialog has brought.

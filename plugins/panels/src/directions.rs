@@ -36,7 +36,7 @@ pub(crate) fn directions(
     mut shown: ResMut<Directions>,
 ) {
     let (Some(guide), Some(camera), Some(lit)) = (learning.guide(), learning.camera(), lit) else {
-        ui.weak("Known once steering has learnt its fields.");
+        ui.weak(tr!("Known once steering has learnt its fields."));
         return;
     };
     let at = fields.picked();
@@ -53,31 +53,35 @@ pub(crate) fn directions(
     }
     ui.columns(2, |columns| {
         for (side, ui) in Side::BOTH.into_iter().zip(columns) {
-            square(ui, fields::name(side), shown.squares[side as usize].as_ref());
+            square(ui, side, shown.squares[side as usize].as_ref());
         }
     });
-    ui.weak("At the point clicked in the picture, or its middle. Centre: along the normal; edge: grazing; 1: as from everywhere alike.");
+    ui.weak(tr!(
+        "At the point clicked in the picture, or its middle. Centre: along the normal; edge: \
+         grazing; 1: as from everywhere alike."
+    ));
 }
 
-fn square(ui: &mut Ui, name: &str, square: Option<&(TextureHandle, [f32; 2])>) {
-    ui.label(name.trim_end_matches(" field"));
-    let side = ui.available_width().min(160.0);
-    let (rect, response) = ui.allocate_exact_size(vec2(side, side), Sense::hover());
-    response.widget_info(|| {
-        egui::WidgetInfo::labeled(
-            egui::Role::Image,
-            true,
-            format!("Directions of the {}", name.to_lowercase()),
-        )
-    });
+fn square(ui: &mut Ui, side: Side, square: Option<&(TextureHandle, [f32; 2])>) {
+    let (name, whole_name) = match side {
+        Side::Primal => (tr!("Radiance"), tr!("Directions of the radiance field")),
+        Side::Dual => (tr!("Importance"), tr!("Directions of the importance field")),
+    };
+    ui.label(name);
+    let width = ui.available_width().min(160.0);
+    let (rect, response) = ui.allocate_exact_size(vec2(width, width), Sense::hover());
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, &whole_name));
     let Some((texture, [lo, hi])) = square else {
         ui.painter().rect_filled(rect, 0.0, colours::UNKNOWN);
-        ui.weak("unknown here");
+        ui.weak(tr!("unknown here"));
         return;
     };
     let whole = Rect::from_min_max(egui::Pos2::ZERO, egui::pos2(1.0, 1.0));
     ui.painter().image(texture.id(), rect, whole, egui::Color32::WHITE);
-    response
-        .on_hover_text("The hemisphere as a square in which equal areas send equal irradiance if all directions are alike (cosine law)");
-    ui.weak(format!("{} to {}", significant(f64::from(*lo), 2), significant(f64::from(*hi), 2)));
+    response.on_hover_text(tr!(
+        "The hemisphere as a square in which equal areas send equal irradiance if all directions \
+         are alike (cosine law)"
+    ));
+    let [lo, hi] = [*lo, *hi].map(|x| significant(f64::from(x), 2));
+    ui.weak(tr!("{} to {}", lo, hi));
 }

@@ -94,15 +94,15 @@ pub(crate) fn hint(ui: &Ui, world: &World) {
         !is_model(path) && (attach::evidence(path).is_some() || dialog::is_photograph(path))
     };
     let text = if is_open && (hovered.is_empty() || hovered.iter().all(is_evidence)) {
-        "Drop it on the member that it is of"
+        tr!("Drop it on the member that it is of")
     } else {
-        "Drop to open"
+        tr!("Drop to open")
     };
     let rect = ui.ctx().content_rect();
     let layer = egui::LayerId::new(egui::Order::Foreground, egui::Id::unique("drop here"));
     let painter = ui.ctx().layer_painter(layer);
     let ink = egui::Color32::WHITE;
-    let galley = painter.layout_no_wrap(text.into(), egui::FontId::proportional(26.0), ink);
+    let galley = painter.layout_no_wrap(text, egui::FontId::proportional(26.0), ink);
     let size = galley.size() + egui::vec2(40.0, 20.0);
     let back = egui::Rect::from_center_size(rect.center_top() + egui::vec2(0.0, 90.0), size);
     painter.rect_filled(back, 8.0, egui::Color32::from_black_alpha(215));

@@ -41,9 +41,27 @@ struct Named {
     what: String,
 }
 
+/// What an edit has done. Whoever works on it speaks English.
+enum Deed {
+    Attached { name: String, of: String },
+    Detached(String),
+    Amended(String),
+}
+
+impl Deed {
+    /// What it is called, in the language of the window.
+    fn said(self) -> String {
+        match self {
+            Self::Attached { name, of } => tr!("attach {} of {}", name, of),
+            Self::Detached(name) => tr!("detach {}", name),
+            Self::Amended(what) => what,
+        }
+    }
+}
+
 /// What has come of an edit.
 enum Outcome {
-    Made(Named, Vec<String>),
+    Made(Change, Deed, Vec<String>),
     /// One that was there already, taken back or made again.
     Turned(Named),
     Refused(String, Option<Named>),
@@ -92,14 +110,14 @@ fn start(
 ) -> Option<Task<Outcome>> {
     let scene = shown.path.clone();
     Some(match edit {
-        Edit::Attach(what) => Task::spawn(jobs, "attaching evidence", move |job| {
+        Edit::Attach(what) => Task::spawn(jobs, tr!("attaching evidence"), move |job| {
             attach(&scene, &what, &access, job).unwrap_or_else(|why| Outcome::Refused(why, None))
         }),
-        Edit::Detach { member, name } => Task::spawn(jobs, "detaching evidence", move |job| {
+        Edit::Detach { member, name } => Task::spawn(jobs, tr!("detaching evidence"), move |job| {
             detach(&scene, &member, &name, &access, job)
                 .unwrap_or_else(|why| Outcome::Refused(why, None))
         }),
-        Edit::Amend(settings, what) => Task::spawn(jobs, "changing the scene", move |job| {
+        Edit::Amend(settings, what) => Task::spawn(jobs, tr!("changing the scene"), move |job| {
             amend(&shown, &settings, what, &access, job)
                 .unwrap_or_else(|why| Outcome::Refused(why, None))
         }),
@@ -109,9 +127,12 @@ fn start(
 }
 
 fn turn(mut named: Named, jobs: &mut Jobs) -> Task<Outcome> {
-    let was_made = named.change.is_made();
-    let label = if was_made { "taking back" } else { "making again" };
-    Task::spawn(jobs, format!("{label}: {}", named.what), move |job| match named.change.turn(job) {
+    let label = if named.change.is_made() {
+        tr!("taking back: {}", named.what)
+    } else {
+        tr!("making again: {}", named.what)
+    };
+    Task::spawn(jobs, label, move |job| match named.change.turn(job) {
         Ok(()) => Outcome::Turned(named),
         Err(why) => Outcome::Refused(why.to_string(), Some(named)),
     })
@@ -123,10 +144,10 @@ fn attach(scene: &Path, what: &Attachment, access: &Access, job: &Job) -> Result
     let proposal = project.propose(what, job).map_err(|why| why.to_string())?;
     let notes = attaching::examine(&proposal, what, job).map_err(|why| why.to_string())?;
     let of = proposal.scene.name_of(&what.member).to_owned();
-    let named = format!("{} of {of}", proposal.name);
+    let name = proposal.name.clone();
     let copies = proposal.commit().map_err(|why| why.to_string())?;
     let change = Change::attached(&project, copies).map_err(|why| why.to_string())?;
-    Ok(Outcome::Made(Named { change, what: format!("attach {named}") }, notes))
+    Ok(Outcome::Made(change, Deed::Attached { name, of }, notes))
 }
 
 /// What `intrados detach` does.
@@ -139,7 +160,7 @@ fn detach(
 ) -> Result<Outcome, String> {
     let project = Project::edit(scene, access, job).map_err(|why| why.to_string())?;
     let (_, change) = project.detach_for_now(member, name, job).map_err(|why| why.to_string())?;
-    Ok(Outcome::Made(Named { change, what: format!("detach {name}") }, Vec::new()))
+    Ok(Outcome::Made(change, Deed::Detached(name.to_owned()), Vec::new()))
 }
 
 /// Writes what a form says into the scene's file.
@@ -152,7 +173,7 @@ fn amend(
 ) -> Result<Outcome, String> {
     let project = Project::edit(&shown.path, access, job).map_err(|why| why.to_string())?;
     let change = project.amend(shown, settings, job).map_err(|why| why.to_string())?;
-    Ok(Outcome::Made(Named { change, what }, Vec::new()))
+    Ok(Outcome::Made(change, Deed::Amended(what), Vec::new()))
 }
 
 /// Takes what has come of an edit, and opens the scene as it is now. Of another scene,
@@ -174,9 +195,10 @@ pub(crate) fn take(
     // What a panic said is told with all others.
     let Ok(done) = done else { return };
     let said = match done {
-        Outcome::Made(named, notes) => {
-            notes.iter().for_each(|note| log.say(format!("note: {note}")));
-            let said = format!("done: {}", named.what);
+        Outcome::Made(change, deed, notes) => {
+            notes.iter().for_each(|note| log.say(tr!("note: {}", note)));
+            let named = Named { change, what: deed.said() };
+            let said = tr!("done: {}", named.what);
             edits.taken_back.clear();
             edits.made.push(named);
             let surplus = edits.made.len().saturating_sub(MOST);
@@ -184,12 +206,12 @@ pub(crate) fn take(
             said
         }
         Outcome::Turned(named) if named.change.is_made() => {
-            let said = format!("made again: {}", named.what);
+            let said = tr!("made again: {}", named.what);
             edits.made.push(named);
             said
         }
         Outcome::Turned(named) => {
-            let said = format!("taken back: {}", named.what);
+            let said = tr!("taken back: {}", named.what);
             edits.taken_back.push(named);
             said
         }
@@ -199,8 +221,8 @@ pub(crate) fn take(
                 Some(named) => edits.taken_back.push(named),
                 None => {}
             }
-            log.say(format!("nothing was changed: {why}"));
-            banners.cannot("Nothing was changed", &why);
+            log.say(tr!("nothing was changed: {}", why));
+            banners.cannot(&tr!("Nothing was changed"), &why);
             return;
         }
     };

@@ -17,6 +17,7 @@ use intrados_stage::{
 use crate::{
     Action, Actions, Log, Look, Quantity,
     fields::{self, Fields},
+    lang::{fixed, local, term},
     number::significant,
     picture,
 };
@@ -60,12 +61,15 @@ pub(crate) fn sheet(
     mut jobs: ResMut<Jobs>,
     mut actions: ResMut<Actions>,
 ) {
-    ui.label("PNG: the picture as it is shown now. EXR: linear radiance with its variance, samples and orders.");
+    ui.label(tr!(
+        "PNG: the picture as it is shown now. EXR: linear radiance with its variance, samples and \
+         orders."
+    ));
     ui.horizontal(|ui| {
-        let label = ui.label("File name");
+        let label = ui.label(tr!("File name"));
         ui.add(egui::TextEdit::singleline(&mut export.path).desired_width(280.0))
             .labelled_by(label.id);
-        if ui.button("Browse…").clicked() {
+        if ui.button(tr!("Browse…")).clicked() {
             actions.ask(Action::ChooseExport);
         }
     });
@@ -73,18 +77,18 @@ pub(crate) fn sheet(
     let kind =
         path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
     let problem = match (kind.as_str(), &render, &exporter) {
-        (_, None, _) => Some("There is no picture yet."),
+        (_, None, _) => Some(tr!("There is no picture yet.")),
         ("png", ..) if matches!(look.quantity, Quantity::Field(side) if fields.painted(side).is_none()) => {
-            Some("The field is not known yet.")
+            Some(tr!("The field is not known yet."))
         }
         ("png", ..) => None,
         ("exr", _, Some(_)) => None,
-        ("exr", _, None) => Some("This build writes no EXR; use `intrados render`."),
-        _ => Some("The name must end in .png or .exr."),
+        ("exr", _, None) => Some(tr!("This build writes no EXR; use `intrados render`.")),
+        _ => Some(tr!("The name must end in .png or .exr.")),
     };
     ui.horizontal(|ui| {
         if ui
-            .add_enabled(problem.is_none() && export.task.is_none(), egui::Button::new("Save"))
+            .add_enabled(problem.is_none() && export.task.is_none(), egui::Button::new(tr!("Save")))
             .clicked()
             && let Some(render) = render
         {
@@ -112,7 +116,7 @@ fn save(
     exporter: Option<&Exporter>,
     path: PathBuf,
 ) -> Task<Result<String, String>> {
-    let label = format!("writing {}", path.display());
+    let label = tr!("writing {}", path.display());
     match exporter.cloned() {
         Some(exporter) => {
             let render = render.clone();
@@ -151,31 +155,40 @@ fn describe(render: &Render, look: &Look, range: Option<[f32; 2]>) -> String {
     if let (Quantity::Field(side), Some([from, to])) =
         (look.quantity, range.map(|r| r.map(|x| significant(f64::from(x), 3))))
     {
-        let ([what, unit], name) = (fields::meaning(side), fields::name(side).to_lowercase());
-        return format!(
-            "{}: {name}, {what}, viridis, logarithmic from {from} to {to} {unit}; scene hash {}; Intrados {}",
+        let [what, unit] = fields::meaning(side);
+        return tr!(
+            "{}: {}, {}, viridis, logarithmic from {} to {} {}; scene hash {}; Intrados {}",
             scene.name,
+            term(&fields::name(side).to_lowercase()),
+            term(what),
+            from,
+            to,
+            unit,
             scene.hash,
             env!("CARGO_PKG_VERSION")
         );
     }
     let what = match look.quantity {
         Quantity::Radiance | Quantity::Field(_) => {
-            format!("radiance at exposure {:+.2} EV", look.exposure)
+            tr!("radiance at exposure {} EV", local(format!("{:+.2}", look.exposure)))
         }
         Quantity::Error => {
-            let [from, to] = picture::ERRORS;
-            format!(
-                "relative standard error of each pixel, viridis, logarithmic from {from} to {to}"
+            let [from, to] = picture::ERRORS.map(|x| local(x.to_string()));
+            tr!(
+                "relative standard error of each pixel, viridis, logarithmic from {} to {}",
+                from,
+                to
             )
         }
     };
-    let order = look.order.map_or_else(|| "all bounces".into(), |order| format!("bounce {order}"));
-    format!(
-        "{}: {what}, {order}, {:?} view; {:.0} samples a pixel; scene hash {}; Intrados {}",
+    let order = look.order.map_or_else(|| tr!("all bounces"), |order| tr!("bounce {}", order));
+    tr!(
+        "{}: {}, {}, {} view; {} samples a pixel; scene hash {}; Intrados {}",
         scene.name,
-        look.view,
-        render.samples_per_pixel(),
+        what,
+        order,
+        term(&format!("{:?}", look.view)),
+        fixed(render.samples_per_pixel(), 0),
         scene.hash,
         env!("CARGO_PKG_VERSION")
     )
@@ -197,8 +210,8 @@ pub(crate) fn write_png(
 pub(crate) fn take(mut export: ResMut<Export>, mut log: ResMut<Log>) {
     let Some(done) = Task::take(&mut export.task) else { return };
     match done {
-        Ok(Ok(what)) => log.say(format!("wrote {what}")),
-        Ok(Err(error)) => log.say(format!("the picture was not written: {error}")),
-        Err(_) => log.say("the picture was not written: the writer broke off"),
+        Ok(Ok(what)) => log.say(tr!("wrote {}", what)),
+        Ok(Err(error)) => log.say(tr!("the picture was not written: {}", error)),
+        Err(_) => log.say(tr!("the picture was not written: the writer broke off")),
     }
 }

@@ -75,10 +75,8 @@ impl Was {
 impl Earlier {
     fn of(prediction: &Prediction, number: usize) -> Self {
         let used = prediction.items.iter().filter(|item| item.used).count();
-        let title = format!(
-            "Prediction {number}, {used} of {} pieces of evidence used",
-            prediction.items.len()
-        );
+        let all = prediction.items.len();
+        let title = tr!("Prediction {}, {} of {} pieces of evidence used", number, used, all);
         Self { title, members: prediction.members.iter().map(Was::of).collect() }
     }
 
@@ -87,12 +85,17 @@ impl Earlier {
         let bad = |why: String| format!("{}: {why}", path.display());
         let bytes = access::read(path, LONGEST).map_err(|why| bad(why.to_string()))?;
         let written: Written = serde_json::from_slice(&bytes).map_err(|why| {
-            bad(format!("is no prediction ({why}): give the predict.json of a folder of `intrados predict --out`"))
+            bad(tr!(
+                "is no prediction ({}): give the predict.json of a folder of `intrados predict \
+                 --out`",
+                why
+            ))
         })?;
         if !written.schema.starts_with(SCHEMA) {
-            let what =
-                format!("is of {:?}: give the predict.json of `intrados predict`", written.schema);
-            return Err(bad(what));
+            return Err(bad(tr!(
+                "is of “{}”: give the predict.json of `intrados predict`",
+                written.schema
+            )));
         }
         let file = path.file_name().unwrap_or_default().to_string_lossy();
         let folder = path.parent().and_then(Path::file_name).unwrap_or_default().to_string_lossy();
@@ -145,7 +148,7 @@ impl History {
         let read = Earlier::read(path)?;
         let common = scene.members.iter().filter(|m| read.member(&m.id).is_some()).count();
         if common == 0 {
-            return Err(format!(
+            return Err(tr!(
                 "{}: none of its members is in {}: it is of another structure",
                 path.display(),
                 scene.name

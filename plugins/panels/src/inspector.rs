@@ -9,6 +9,7 @@ use intrados_transport::Side;
 use crate::{
     Latest, Look, Selection, Statistics, colours,
     fields::{self, Fields},
+    lang::{fixed, term},
     number::{percent, plus_minus, significant},
     picture::{self, Cursor, Under, relative_error},
 };
@@ -33,14 +34,14 @@ pub(crate) fn inspector(
             under_cursor(ui, &scene.0, render, statistics.share(render), &look, &fields, under)
         }
         _ => {
-            ui.weak("Move over the picture to read a value.");
+            ui.weak(tr!("Move over the picture to read a value."));
         }
     }
     ui.separator();
     match selection.0.and_then(|i| Some((i, scene.0.members.get(i)?))) {
         Some((index, member)) => selected(ui, index, member, &latest),
         None => {
-            ui.weak("Click on a member to select it.");
+            ui.weak(tr!("Click on a member to select it."));
         }
     }
 }
@@ -58,44 +59,45 @@ fn under_cursor(
     let [x, y] = fields::pixel(size, under.at);
     let pixel = y * size[0] + x;
     Grid::new("cursor").num_columns(2).show(ui, |ui| {
-        ui.weak("Pixel");
+        ui.weak(tr!("Pixel"));
         ui.label(format!("{x}, {y}"));
         ui.end_row();
         if let Some((mean, variance)) = picture::value(render, look, share, pixel) {
             let error = variance.map(f32::sqrt);
-            ui.weak("Radiance Y");
+            ui.weak(tr!("Radiance Y"));
             ui.label(plus_minus(f64::from(luminance(mean)), f64::from(luminance(error)), RADIANCE));
             ui.end_row();
-            for (name, k) in [("red", 0), ("green", 1), ("blue", 2)] {
+            for (name, k) in [(tr!("red"), 0), (tr!("green"), 1), (tr!("blue"), 2)] {
                 ui.weak(name);
                 ui.label(plus_minus(f64::from(mean[k]), f64::from(error[k]), ""));
                 ui.end_row();
             }
-            ui.weak("Relative error");
+            ui.weak(tr!("Relative error"));
             ui.label(percent(f64::from(relative_error(mean, variance))));
             ui.end_row();
         }
         for (side, name) in
-            [(Side::Primal, "Light, by field"), (Side::Dual, "Importance, by field")]
+            [(Side::Primal, tr!("Light, by field")), (Side::Dual, tr!("Importance, by field"))]
         {
             if let Some(value) = fields.value(side, under.at) {
                 ui.weak(name);
                 let known =
                     format!("{} {}", significant(f64::from(value), 3), fields::meaning(side)[1]);
-                ui.label(if value.is_nan() { "unknown".into() } else { known });
+                ui.label(if value.is_nan() { tr!("unknown") } else { known });
                 ui.end_row();
             }
         }
         if let Some((object, point)) = under.hit {
-            ui.weak("Point");
-            ui.label(format!("{:.3}, {:.3}, {:.3} m", point.x, point.y, point.z));
+            ui.weak(tr!("Point"));
+            let [x, y, z] = point.to_array().map(|x| fixed(x, 3));
+            ui.label(tr!("{}, {}, {} m", x, y, z));
             ui.end_row();
             if let Some(object) = scene.objects.get(object) {
-                ui.weak("Object");
+                ui.weak(tr!("Object"));
                 ui.label(&object.name);
                 ui.end_row();
                 if let Some(member) = object.member.and_then(|m| scene.members.get(m)) {
-                    ui.weak("Member");
+                    ui.weak(tr!("Member"));
                     ui.label(&member.name);
                     ui.end_row();
                 }
@@ -112,40 +114,36 @@ fn selected(ui: &mut Ui, index: usize, member: &Member, latest: &Latest) {
             ui.label(value);
             ui.end_row();
         };
-        row("Kind", format!("{:?}", member.kind).to_lowercase());
-        row(
-            "Concrete",
-            format!(
-                "{}{}",
-                member.concrete,
-                if member.concrete_assumed { ", assumed" } else { "" }
-            ),
-        );
-        let size = member.bounds[1] - member.bounds[0];
-        row("Size", format!("{:.2} × {:.2} × {:.2} m", size.x, size.y, size.z));
+        row(&tr!("Kind"), term(&format!("{:?}", member.kind).to_lowercase()));
+        let concrete = if member.concrete_assumed {
+            tr!("{}, assumed", member.concrete)
+        } else {
+            member.concrete.clone()
+        };
+        row(&tr!("Concrete"), concrete);
+        let size = (member.bounds[1] - member.bounds[0]).to_array();
+        let [x, y, z] = size.map(|x| fixed(x, 2));
+        row(&tr!("Size"), format!("{x} × {y} × {z} m"));
         if member.volume > 0.0 {
-            row("Volume", format!("{:.3} m³", member.volume));
+            row(&tr!("Volume"), format!("{} m³", fixed(member.volume, 3)));
         }
         if member.id != member.name {
-            row("Id", member.id.clone());
+            row(&tr!("Id"), member.id.clone());
         }
-        match latest.member(index) {
-            Some(known) => {
-                row("Damage d", plus_minus(known.damage.value, known.damage.std_error, ""))
-            }
-            None => row("Damage d", "no evidence".into()),
-        }
+        let damage = latest.member(index).map(|known| known.damage);
+        let damage = damage.map(|d| plus_minus(d.value, d.std_error, ""));
+        row(&tr!("Damage d"), damage.unwrap_or_else(|| tr!("no evidence")));
         if let Some(truth) =
             latest.result.as_ref().and_then(|r| r.members.get(index)?.truth.as_ref())
         {
-            row("Truth", format!("{:.3} ({})", truth.damage, truth.origin));
+            row(&tr!("Truth"), format!("{} ({})", fixed(truth.damage, 3), term(truth.origin)));
         }
     });
     if let Some((verdict, steps)) = latest.state(index) {
         ui.horizontal(|ui| {
             colours::severity(ui, verdict, steps);
-            ui.label(&verdict.state);
+            ui.label(term(&verdict.state));
         });
-        ui.weak(&verdict.advice);
+        ui.weak(term(&verdict.advice));
     }
 }

@@ -2,25 +2,28 @@
 //!
 //! English stands in the code, where it is drawn: `tr!("{} of {}", done, all)`. What it is called
 //! elsewhere stands in `words/*.ron`, all languages beside each other. What a message lacks is said
-//! in English. Messages of the engines, files and logs are English everywhere, so that they can be
-//! sought for.
+//! in English. What the engines say is found again by its words ([`term`]); files are English
+//! everywhere, so that they can be compared.
 //!
 //! Three languages that know one and many at most need no grammar: where that differs, the code has
 //! two messages.
 
-use std::{cell::Cell, collections::HashMap, fmt::Display, sync::OnceLock};
+use std::{cell::Cell, collections::HashMap, fmt::Display, ops::RangeInclusive, sync::OnceLock};
 
-use egui::{DragValue, emath::Numeric};
+use egui::{DragValue, Slider, emath::Numeric};
 use serde::{Deserialize, Serialize};
 
 /// What is said in German and in Chinese, by what is said in English.
-const WORDS: [(&str, &str); 5] = [
+const WORDS: [(&str, &str); 6] = [
     ("common.ron", include_str!("../words/common.ron")),
     ("files.ron", include_str!("../words/files.ron")),
     ("window.ron", include_str!("../words/window.ron")),
     ("member.ron", include_str!("../words/member.ron")),
     ("terms.ron", include_str!("../words/terms.ron")),
+    ("told.ron", include_str!("../words/told.ron")),
 ];
+/// Those that are said by [`term`]: words, and sentences of the engines.
+const TERMS: [&str; 2] = ["terms.ron", "told.ron"];
 
 /// A language that the window speaks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -96,10 +99,52 @@ pub(crate) fn say(text: &str, values: &[&dyn Display]) -> String {
     filled(translated(text), values)
 }
 
-/// A word that is known only when it is said: a state, a kind, a cause. As it is, where it has no
-/// translation.
+/// A text that is known only when it is said: a state, a kind, a sentence of an engine. One with
+/// values in it is found by the term that has `{}` for them, and they are terms again. As it is,
+/// where it has no translation.
 pub(crate) fn term(text: &str) -> String {
-    translated(text).to_owned()
+    if spoken() == Language::English || words().contains_key(text) {
+        return translated(text).to_owned();
+    }
+    let found = patterns().iter().find_map(|pattern| Some((pattern, values(pattern, text)?)));
+    let Some((pattern, values)) = found else { return text.to_owned() };
+    let values: Vec<String> = values.into_iter().map(term).collect();
+    let values: Vec<&dyn Display> = values.iter().map(|v| v as &dyn Display).collect();
+    filled(translated(pattern), &values)
+}
+
+/// Terms with values in them, those that say most first.
+fn patterns() -> &'static [String] {
+    static PATTERNS: OnceLock<Vec<String>> = OnceLock::new();
+    PATTERNS.get_or_init(|| {
+        let terms = WORDS.iter().filter(|(file, _)| TERMS.contains(file));
+        let terms = terms.flat_map(|(file, text)| parsed(file, text).into_keys());
+        let mut patterns: Vec<String> = terms.filter(|term| term.contains("{}")).collect();
+        patterns.sort_by_key(|p| (std::cmp::Reverse(p.len()), p.clone()));
+        patterns
+    })
+}
+
+/// What stands in `text` where `pattern` has `{}`; none: it is another text.
+fn values<'a>(pattern: &str, text: &'a str) -> Option<Vec<&'a str>> {
+    let (head, tail) = pattern.split_once("{}")?;
+    let mut rest = text.strip_prefix(head)?;
+    let mut values = Vec::new();
+    let mut parts = tail.split("{}").peekable();
+    while let Some(part) = parts.next() {
+        let end = match parts.peek() {
+            Some(_) => rest.find(part)?,
+            None => rest.strip_suffix(part)?.len(),
+        };
+        let value = &rest[..end];
+        // Nothing is no value, and the text itself would be sought for ever.
+        if value.is_empty() || value.len() == text.len() {
+            return None;
+        }
+        values.push(value);
+        rest = &rest[end + part.len()..];
+    }
+    Some(values)
 }
 
 fn translated(text: &str) -> &str {
@@ -164,6 +209,12 @@ pub(crate) fn drag<N: Numeric>(value: &mut N) -> DragValue<'_> {
     DragValue::new(value).custom_formatter(shown).custom_parser(typed)
 }
 
+/// A slider, shown and read as the language writes numbers.
+pub(crate) fn slide<N: Numeric>(value: &mut N, range: RangeInclusive<N>) -> Slider<'_> {
+    let shown = |x, decimals| local(egui::emath::format_with_decimals_in_range(x, decimals));
+    Slider::new(value, range).custom_formatter(shown).custom_parser(typed)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -171,9 +222,6 @@ mod tests {
         collections::BTreeSet,
         path::{Path, PathBuf},
     };
-
-    /// Words that are said by [`term`]: no `tr!` has them.
-    const TERMS: &str = "terms.ron";
 
     /// All sources of this crate.
     fn pages(folder: &Path, into: &mut Vec<PathBuf>) {
@@ -243,13 +291,25 @@ mod tests {
                     assert_eq!(shown(message), shown(&other), "{file}: {english:?}: {other:?}");
                     assert!(!other.is_empty(), "{file}: {english:?}");
                 }
-                let is_said = file == TERMS || said.contains(&english);
+                let is_said = TERMS.contains(&file) || said.contains(&english);
                 assert!(is_said, "{file}: nobody says {english:?}");
                 assert!(known.insert(english.clone()), "{file}: {english:?} stands there twice");
             }
         }
         let missing: Vec<&String> = said.difference(&known).collect();
         assert!(missing.is_empty(), "without a translation: {missing:#?}");
+    }
+
+    #[test]
+    fn what_an_engine_says_is_found_by_its_words() {
+        let three = Some(vec!["3", "of ten"]);
+        assert_eq!(values("slice {} is {} mm", "slice 3 is of ten mm"), three);
+        assert_eq!(values("slice {}", "slices"), None);
+        assert_eq!(values("{}", "a text that would be sought for ever"), None);
+        speak(Language::German);
+        let said = term("reading slice 3 of 10");
+        speak(Language::English);
+        assert_eq!(said, "Schnittbild 3 von 10 wird ausgewertet");
     }
 
     #[test]

@@ -19,7 +19,7 @@ use intrados_scene::{
 use intrados_stage::{Jobs, Pace, catch};
 
 use crate::{
-    Action, Actions, Banners, Latest, Log, Look, Selection, Workspace,
+    Action, Actions, Banners, Language, Latest, Log, Look, Selection, Workspace,
     attach::{self, Form},
     banner, command,
     create::{self, Creation},
@@ -29,6 +29,7 @@ use crate::{
     edits::Edits,
     export::{self, Export},
     fields::Fields,
+    lang::{self, fixed, term},
     log,
     outline::Outline,
     photos::Photos,
@@ -98,9 +99,9 @@ pub(crate) fn greet(
 ) {
     if let Some(SceneFailed(error)) = failed.read().last() {
         if *error == LoadError::Cancelled {
-            log.say("opening was cancelled");
+            log.say(tr!("opening was cancelled"));
         } else {
-            log.say(format!("not opened: {error}"));
+            log.say(tr!("not opened: {}", error));
             banners.not_opened(error);
         }
     }
@@ -125,14 +126,14 @@ pub(crate) fn greet(
     }
     let [from, to] = scene.bounds();
     let size = to - from;
-    log.say(format!(
-        "opened {}: {} triangles, {} members, {:.2} × {:.2} × {:.2} m",
+    log.say(tr!(
+        "opened {}: {} triangles, {} members, {} × {} × {} m",
         scene.name,
         scene.triangle_count(),
         scene.members.len(),
-        size.x,
-        size.y,
-        size.z
+        fixed(size.x, 2),
+        fixed(size.y, 2),
+        fixed(size.z, 2)
     ));
     for warning in &scene.warnings {
         log.say(format!("⚠ {warning}"));
@@ -166,6 +167,7 @@ pub fn is_busy(world: &mut World) -> bool {
 
 /// Draws the whole window.
 pub fn show(ui: &mut Ui, world: &mut World) {
+    workspace::speak(world);
     drops::take(ui, world);
     world.resource_mut::<Layout>().bypass_change_detection().tell(ui);
     workspace::dress(ui, world);
@@ -207,8 +209,8 @@ fn run(world: &mut World, system: SystemId<InMut<'static, Ui>>, name: &str, ui: 
     match catch(|| world.run_system_with(system, ui)) {
         Ok(Ok(())) => {}
         Ok(Err(RegisteredSystemError::SystemMissing(_))) => {
-            ui.weak("This broke off; “Reload scene” brings it back.");
-            if ui.button("Reload scene").clicked() {
+            ui.weak(tr!("This broke off; “Reload scene” brings it back."));
+            if ui.button(tr!("Reload scene")).clicked() {
                 world.resource_mut::<Actions>().ask(Action::Reload);
             }
         }
@@ -218,7 +220,7 @@ fn run(world: &mut World, system: SystemId<InMut<'static, Ui>>, name: &str, ui: 
             banner::tell(
                 &mut world.resource_mut::<Banners>(),
                 &mut log,
-                &format!("The panel “{name}” broke off"),
+                &tr!("The panel “{}” broke off", term(name)),
                 &fault,
             );
             *world.resource_mut::<Log>() = log;
@@ -247,7 +249,7 @@ fn status(ui: &mut Ui, world: &mut World) {
             log::first(ui, jobs);
         }
         if count > 1 {
-            ui.menu_button(format!("and {} more", count - 1), |ui| log::list(ui, jobs));
+            ui.menu_button(tr!("and {} more", count - 1), |ui| log::list(ui, jobs));
         }
         // What a banner says, or has said until it was put away, need not be said twice.
         if count == 0
@@ -265,16 +267,16 @@ fn menu(ui: &mut Ui, world: &mut World) {
     let recent = world.resource::<Recent>().list().to_vec();
     let mut asked = Vec::new();
     egui::MenuBar::new().ui(ui, |ui| {
-        ui.menu_button("File", |ui| {
+        ui.menu_button(tr!("File"), |ui| {
             let mut entry = |ui: &mut Ui, name: &str, keys: &str, action: Action| {
                 if ui.add(egui::Button::new(name).shortcut_text(keys)).clicked() {
                     asked.push(action);
                 }
             };
-            entry(ui, "New structure…", "Ctrl+N", Action::New);
-            entry(ui, "Open…", "Ctrl+O", Action::Choose);
-            entry(ui, "Start screen", "", Action::StartScreen(true));
-            entry(ui, "Export picture…", "Ctrl+E", Action::Export);
+            entry(ui, &tr!("New structure…"), "Ctrl+N", Action::New);
+            entry(ui, &tr!("Open…"), "Ctrl+O", Action::Choose);
+            entry(ui, &tr!("Start screen"), "", Action::StartScreen(true));
+            entry(ui, &tr!("Export picture…"), "Ctrl+E", Action::Export);
             ui.separator();
             for path in &recent {
                 if start::recent_button(ui, path).clicked() {
@@ -284,16 +286,16 @@ fn menu(ui: &mut Ui, world: &mut World) {
             if !recent.is_empty() {
                 ui.separator();
             }
-            if ui.button("Quit").clicked() {
+            if ui.button(tr!("Quit")).clicked() {
                 ui.ctx().send_viewport_cmd(egui::ViewportCommand::Close);
             }
         });
-        ui.menu_button("Save…", |ui| {
+        ui.menu_button(tr!("Save…"), |ui| {
             let latest = world.resource::<Latest>();
             let has = scene.as_ref().is_some_and(|s| latest.result_for(s).is_some());
             saving::menu(ui, has, &mut asked);
         });
-        ui.menu_button("Edit", |ui| {
+        ui.menu_button(tr!("Edit"), |ui| {
             for (name, keys, may, action) in edits(world, scene.is_some()) {
                 let button = egui::Button::new(name).shortcut_text(keys);
                 if ui.add_enabled(may, button).clicked() {
@@ -301,36 +303,36 @@ fn menu(ui: &mut Ui, world: &mut World) {
                 }
             }
         });
-        ui.menu_button("View", |ui| {
+        ui.menu_button(tr!("View"), |ui| {
             for (name, keys, action) in [
-                ("Fit into the picture", "F", Action::Frame),
-                ("Scene's camera", "Home", Action::Home),
+                (tr!("Fit into the picture"), "F", Action::Frame),
+                (tr!("Scene's camera"), "Home", Action::Home),
             ] {
                 if ui.add(egui::Button::new(name).shortcut_text(keys)).clicked() {
                     asked.push(action);
                 }
             }
             let cameras = scene.as_ref().map(|s| s.cameras.len()).unwrap_or_default();
-            ui.menu_button("Cameras", |ui| {
+            ui.menu_button(tr!("Cameras"), |ui| {
                 for (i, camera) in scene.iter().flat_map(|s| &s.cameras).enumerate() {
                     if ui.button(&camera.name).clicked() {
                         asked.push(Action::Camera(i));
                     }
                 }
                 if cameras == 0 {
-                    ui.weak("The scene has none of its own.");
+                    ui.weak(tr!("The scene has none of its own."));
                 }
             });
             let mut look = *world.resource::<Look>();
-            ui.checkbox(&mut look.outline, "Outline the selected member");
+            ui.checkbox(&mut look.outline, tr!("Outline the selected member"));
             world.resource_mut::<Look>().set_if_neq(look);
             ui.separator();
             arrangement(ui, world, &mut asked);
         });
-        if ui.button("Commands").on_hover_text("Ctrl+P").clicked() {
+        if ui.button(tr!("Commands")).on_hover_text("Ctrl+P").clicked() {
             asked.push(Action::Palette);
         }
-        if ui.button("Keys").on_hover_text("F1 or ?").clicked() {
+        if ui.button(tr!("Keys")).on_hover_text(tr!("F1 or ?")).clicked() {
             asked.push(Action::Keys);
         }
         if let Some(scene) = scene {
@@ -341,8 +343,8 @@ fn menu(ui: &mut Ui, world: &mut World) {
                         .on_hover_text(scene.warnings.join("\n"));
                 }
                 let expert = command::is_expert(world);
-                let hint = "Estimators, light meters, fields and convergence (F9)";
-                if ui.selectable_label(expert, "Expert").on_hover_text(hint).clicked() {
+                let hint = tr!("Estimators, light meters, fields and convergence (F9)");
+                if ui.selectable_label(expert, tr!("Expert")).on_hover_text(hint).clicked() {
                     asked.push(Action::SwapWorkspace);
                 }
             });
@@ -357,44 +359,56 @@ fn edits(world: &World, is_open: bool) -> [(String, &'static str, bool, Action);
     let edits = world.resource::<Edits>();
     let is_free = !edits.is_busy();
     let [undo, redo] = edits.next();
-    let named = |word: &str, what: Option<&str>| match what {
+    let named = |word: String, what: Option<&str>| match what {
         Some(what) => format!("{word}: {what}"),
-        None => word.to_owned(),
+        None => word,
     };
     [
-        (named("Undo", undo), "Ctrl+Z", is_free && undo.is_some(), Action::Undo),
-        (named("Redo", redo), "Ctrl+Shift+Z", is_free && redo.is_some(), Action::Redo),
-        ("Attach evidence…".into(), "A", has_member, Action::Fill(Vec::new(), None)),
+        (named(tr!("Undo"), undo), "Ctrl+Z", is_free && undo.is_some(), Action::Undo),
+        (named(tr!("Redo"), redo), "Ctrl+Shift+Z", is_free && redo.is_some(), Action::Redo),
+        (tr!("Attach evidence…"), "A", has_member, Action::Fill(Vec::new(), None)),
     ]
 }
 
-/// Layouts, panels and themes.
+/// Layouts, panels, themes and languages.
 fn arrangement(ui: &mut Ui, world: &World, asked: &mut Vec<Action>) {
     let desk = world.resource::<Desk>();
     for workspace in Workspace::BOTH {
-        let name = format!("{}'s layout", workspace.name());
+        let name = match workspace {
+            Workspace::Inspector => tr!("Inspector's layout"),
+            Workspace::Expert => tr!("Expert's layout"),
+        };
         if ui.radio(desk.shown() == workspace, name).on_hover_text("F9").clicked() {
             asked.push(Action::Arrange(workspace));
         }
     }
-    ui.menu_button("Panels", |ui| {
+    ui.menu_button(tr!("Panels"), |ui| {
         for panel in &world.resource::<Panels>().0 {
             let mut is_open = desk.is_open(&panel.name);
-            if ui.checkbox(&mut is_open, &panel.name).clicked() {
+            if ui.checkbox(&mut is_open, term(&panel.name)).clicked() {
                 asked.push(Action::Panel(panel.name.clone(), is_open));
             }
         }
     });
-    if ui.button("Panels as at first").clicked() {
+    if ui.button(tr!("Panels as at first")).clicked() {
         asked.push(Action::ResetLayout);
     }
     ui.separator();
     use egui::ThemePreference::{Dark, Light, System};
-    for (theme, name) in [(System, "As the system"), (Light, "Light theme"), (Dark, "Dark theme")] {
+    for (theme, name) in
+        [(System, tr!("As the system")), (Light, tr!("Light theme")), (Dark, tr!("Dark theme"))]
+    {
         if ui.radio(desk.theme() == theme, name).clicked() {
             asked.push(Action::Theme(theme));
         }
     }
+    ui.menu_button(tr!("Language"), |ui| {
+        for language in Language::ALL {
+            if ui.radio(lang::spoken() == language, language.name()).clicked() {
+                asked.push(Action::Speak(language));
+            }
+        }
+    });
 }
 
 /// What lies on top.
@@ -413,7 +427,7 @@ fn sheets(
     let mut open = world.resource::<Form>().is_open;
     if open {
         // It may be drawn aside, to see where on the member something is.
-        egui::Window::new("Attach evidence")
+        egui::Window::new(tr!("Attach evidence"))
             .open(&mut open)
             .collapsible(false)
             .resizable(false)
@@ -423,21 +437,21 @@ fn sheets(
     }
     let mut open = world.resource::<Creation>().is_open;
     if open {
-        centred("New structure").open(&mut open).show(ui.ctx(), |ui| {
+        centred(&tr!("New structure")).open(&mut open).show(ui.ctx(), |ui| {
             run(world, creation, "new structure", ui);
         });
         world.resource_mut::<Creation>().is_open &= open;
     }
     let mut open = world.resource::<Saving>().is_shown();
     if open {
-        centred("Save").open(&mut open).show(ui.ctx(), |ui| run(world, saving, "save", ui));
+        centred(&tr!("Save")).open(&mut open).show(ui.ctx(), |ui| run(world, saving, "save", ui));
         if !open {
             world.resource_mut::<Saving>().dismiss();
         }
     }
     let mut open = world.resource::<Export>().shown;
     if open {
-        centred("Export picture")
+        centred(&tr!("Export picture"))
             .open(&mut open)
             .show(ui.ctx(), |ui| run(world, sheet, "export", ui));
         // The sheet may have closed itself.

@@ -4,6 +4,8 @@ use bevy_ecs::prelude::*;
 use egui::{ProgressBar, ScrollArea, Ui};
 use intrados_stage::{Job, Jobs};
 
+use crate::lang::term;
+
 /// Lines kept.
 const LINES: usize = 500;
 
@@ -37,14 +39,14 @@ pub(crate) fn log(InMut(ui): InMut<Ui>, log: Res<Log>) {
             ui.label(line);
         }
         if log.lines().is_empty() {
-            ui.weak("Nothing has happened yet.");
+            ui.weak(tr!("Nothing has happened yet."));
         }
     });
 }
 
 pub(crate) fn jobs(InMut(ui): InMut<Ui>, mut jobs: ResMut<Jobs>) {
     if !list(ui, jobs.bypass_change_detection()) {
-        ui.weak("No job is running.");
+        ui.weak(tr!("No job is running."));
     }
 }
 
@@ -65,15 +67,16 @@ pub(crate) fn first(ui: &mut Ui, jobs: &mut Jobs) {
 }
 
 fn row(ui: &mut Ui, job: &Job) {
+    let label = term(&job.label());
     if job.is_cancelled() {
         ui.add(egui::Spinner::new());
-        ui.weak(format!("{}: stopping", job.label()));
+        ui.weak(tr!("{}: stopping", label));
         return;
     }
-    let hint = "Stops the work; nothing half done is left";
-    if ui.button("Cancel").on_hover_text(hint).clicked() {
+    let hint = tr!("Stops the work; nothing half done is left");
+    if ui.button(tr!("Cancel")).on_hover_text(hint).clicked() {
         job.cancel();
     }
     ui.add(ProgressBar::new(job.done()).desired_width(160.0).show_percentage());
-    ui.label(job.label());
+    ui.label(label);
 }

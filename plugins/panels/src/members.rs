@@ -4,22 +4,26 @@ use bevy_ecs::prelude::*;
 use egui::{ScrollArea, Ui};
 use intrados_scene::{Member, MemberKind, Scene, plugin::CurrentScene};
 
-use crate::{Action, Actions, Latest, Selection, colours, plus_minus};
+use crate::{
+    Action, Actions, Latest, Selection, colours,
+    lang::{fixed, term},
+    plus_minus,
+};
 
 /// Plural, for the group's heading.
-pub(crate) fn plural(kind: MemberKind) -> &'static str {
+fn plural(kind: MemberKind) -> String {
     match kind {
-        MemberKind::Column => "Columns",
-        MemberKind::Beam => "Beams",
-        MemberKind::Slab => "Slabs",
-        MemberKind::Wall => "Walls",
-        MemberKind::Footing => "Footings",
-        MemberKind::Lining => "Linings",
-        MemberKind::Segment => "Segments",
-        MemberKind::Tendon => "Tendons",
-        MemberKind::Bar => "Bars",
-        MemberKind::Pipe => "Pipes",
-        MemberKind::Other => "Others",
+        MemberKind::Column => tr!("Columns"),
+        MemberKind::Beam => tr!("Beams"),
+        MemberKind::Slab => tr!("Slabs"),
+        MemberKind::Wall => tr!("Walls"),
+        MemberKind::Footing => tr!("Footings"),
+        MemberKind::Lining => tr!("Linings"),
+        MemberKind::Segment => tr!("Segments"),
+        MemberKind::Tendon => tr!("Tendons"),
+        MemberKind::Bar => tr!("Bars"),
+        MemberKind::Pipe => tr!("Pipes"),
+        MemberKind::Other => tr!("Others"),
     }
 }
 
@@ -64,7 +68,7 @@ pub(crate) fn members(
     let Some(scene) = scene else { return };
     let scene = &scene.0;
     if scene.members.is_empty() {
-        ui.weak("This scene has no structural members.");
+        ui.weak(tr!("This scene has no structural members."));
         return;
     }
     progress(ui, &latest, &mut actions);
@@ -104,12 +108,12 @@ fn row(
                 (latest.member(index), latest.state(index))
             {
                 let damage = known.damage;
-                let hint = format!(
+                let hint = tr!(
                     "{}: damage d = {}",
-                    verdict.state,
+                    term(&verdict.state),
                     plus_minus(damage.value, damage.std_error, "")
                 );
-                ui.label(format!("{:.2}", damage.value)).on_hover_text(hint);
+                ui.label(fixed(damage.value, 2)).on_hover_text(hint);
                 colours::severity(ui, verdict, steps);
             }
             let rest = egui::Layout::left_to_right(egui::Align::Center)
@@ -134,14 +138,14 @@ fn row(
 fn hint(ui: &mut Ui, member: &Member) {
     ui.strong(&member.name);
     let size = member.bounds[1] - member.bounds[0];
-    ui.label(format!("{} × {} × {} m", short(size.x), short(size.y), short(size.z)));
-    let assumed = if member.concrete_assumed { " (assumed)" } else { "" };
-    ui.label(format!("{}{assumed}", member.concrete));
-    ui.weak("Click to select, double-click to look at it");
-}
-
-fn short(x: f32) -> String {
-    format!("{x:.2}")
+    let [x, y, z] = size.to_array().map(|x| fixed(x, 2));
+    ui.label(format!("{x} × {y} × {z} m"));
+    ui.label(if member.concrete_assumed {
+        tr!("{} (assumed)", member.concrete)
+    } else {
+        member.concrete.clone()
+    });
+    ui.weak(tr!("Click to select, double-click to look at it"));
 }
 
 /// How far the prediction is, and how to go on where it was cancelled.
@@ -151,12 +155,13 @@ pub(crate) fn progress(ui: &mut Ui, latest: &Latest, actions: &mut Actions) {
         return;
     }
     if !latest.cancelled {
-        ui.weak(format!("Reading CT slices, computing lives: {done} of {all}"));
+        ui.weak(tr!("Reading CT slices, computing lives: {} of {}", done, all));
         return;
     }
     ui.horizontal_wrapped(|ui| {
-        ui.label(format!("⏹ Prediction cancelled: {done} of {all} done"));
-        if ui.button("▶ Predict on").on_hover_text("Goes on where it was cancelled").clicked() {
+        ui.label(tr!("⏹ Prediction cancelled: {} of {} done", done, all));
+        let hint = tr!("Goes on where it was cancelled");
+        if ui.button(tr!("▶ Predict on")).on_hover_text(hint).clicked() {
             actions.ask(Action::Predict);
         }
     });

@@ -6,12 +6,14 @@ use intrados_light::{MeterReading, SideReading};
 
 use crate::{
     Statistics,
+    lang::local,
     number::{percent, plus_minus},
+    steering::side_name,
 };
 
 pub(crate) fn meters(InMut(ui): InMut<Ui>, statistics: Res<Statistics>) {
     if statistics.meters.is_empty() {
-        ui.weak("No meter has been read.");
+        ui.weak(tr!("No meter has been read."));
         return;
     }
     ScrollArea::vertical().auto_shrink([false, true]).show(ui, |ui| {
@@ -31,7 +33,7 @@ fn rows(ui: &mut Ui, reading: &MeterReading) {
         let text = if side.converged {
             String::new()
         } else {
-            format!("The error bar may not be trusted yet: {}", side.complaint)
+            tr!("The error bar may not be trusted yet: {}", side.complaint)
         };
         let mark = if side.converged { "" } else { " ⚠" };
         let label = ui.label(format!("{}{mark}", plus_minus(side.mean, side.std_error, &unit)));
@@ -40,25 +42,26 @@ fn rows(ui: &mut Ui, reading: &MeterReading) {
         }
         ui.end_row();
     };
-    side("primal", &reading.primal);
-    side("dual", &reading.dual);
+    side(&tr!("primal"), &reading.primal);
+    side(&tr!("dual"), &reading.dual);
     let combined = &reading.combined;
-    ui.weak("combined");
+    ui.weak(tr!("combined"));
     let mark = if combined.converged { "" } else { " ⚠" };
     let trust = if combined.converged {
         String::new()
     } else {
-        format!("; the error bar may not be trusted yet: {}", combined.complaint)
+        tr!("; the error bar may not be trusted yet: {}", combined.complaint)
     };
     ui.label(format!("{}{mark}", plus_minus(combined.mean, combined.std_error, &unit)))
-        .on_hover_text(format!(
-            "relative error {}; the {:?} side carries more weight{trust}",
+        .on_hover_text(tr!(
+            "relative error {}; the {} side carries more weight{}",
             percent(combined.std_error / combined.mean),
-            combined.side
+            side_name(combined.side),
+            trust
         ));
     ui.end_row();
     if let Some(z) = reading.duality_z {
-        ui.weak("duality gap");
+        ui.weak(tr!("duality gap"));
         let trusted = [&reading.primal, &reading.dual]
             .into_iter()
             .flatten()
@@ -73,12 +76,15 @@ fn rows(ui: &mut Ui, reading: &MeterReading) {
 pub(crate) fn gap(ui: &mut Ui, z: f64, trusted: bool) {
     let (mark, what) = match z.abs() {
         _ if !trusted => (
-            "(too early)",
-            "one side has not converged: its error bar is too small, and the gap says nothing yet",
+            tr!("(too early)"),
+            tr!(
+                "one side has not converged: its error bar is too small, and the gap says nothing \
+                 yet"
+            ),
         ),
-        z if z < 2.0 => ("✔", "the two sides agree"),
-        z if z < 3.0 => ("", "one pair in 22 is this far apart by chance"),
-        _ => ("⚠", "the two sides contradict each other, or an error bar is too small"),
+        z if z < 2.0 => ("✔".into(), tr!("the two sides agree")),
+        z if z < 3.0 => (String::new(), tr!("one pair in 22 is this far apart by chance")),
+        _ => ("⚠".into(), tr!("the two sides contradict each other, or an error bar is too small")),
     };
-    ui.label(format!("{z:+.1} σ {mark}")).on_hover_text(what);
+    ui.label(format!("{} σ {mark}", local(format!("{z:+.1}")))).on_hover_text(what);
 }

@@ -2,6 +2,8 @@
 
 use intrados_stage::time::{DAY, HOUR};
 
+use crate::lang::{fixed, local};
+
 /// `mean ± error unit`, the error with two digits and the mean with as many as it leaves. Where no
 /// error is known: the mean alone.
 ///
@@ -15,24 +17,24 @@ use intrados_stage::time::{DAY, HOUR};
 #[must_use]
 pub fn plus_minus(mean: f64, error: f64, unit: &str) -> String {
     if !mean.is_finite() {
-        return "unknown".into();
+        return tr!("unknown");
     }
     if mean == 0.0 && error == 0.0 {
         return format!("0 {unit}");
     }
     if !error.is_finite() {
-        return format!("{} {unit}, error unknown", significant(mean, 4));
+        return tr!("{} {}, error unknown", significant(mean, 4), unit);
     }
     let largest = mean.abs().max(error);
     let exponent = largest.log10().floor() as i32;
     // Plain digits from a thousandth to a million, powers of ten beyond.
     if (-3..6).contains(&exponent) {
         let d = decimals(error);
-        return format!("{mean:.d$} ± {error:.d$} {unit}");
+        return format!("{} ± {} {unit}", fixed(mean, d), fixed(error, d));
     }
     let (m, e) = (mean / 10_f64.powi(exponent), error / 10_f64.powi(exponent));
     let d = decimals(e);
-    format!("({m:.d$} ± {e:.d$})e{exponent} {unit}")
+    format!("({} ± {})e{exponent} {unit}", fixed(m, d), fixed(e, d))
 }
 
 /// A value that a click puts on the clipboard, with its unit and its error.
@@ -42,7 +44,7 @@ pub(crate) fn copied(ui: &mut egui::Ui, text: egui::RichText) -> egui::Response 
     if label.clicked() {
         ui.ctx().copy_text(plain);
     }
-    label.on_hover_text("Click to copy").on_hover_cursor(egui::CursorIcon::Copy)
+    label.on_hover_text(tr!("Click to copy")).on_hover_cursor(egui::CursorIcon::Copy)
 }
 
 /// Decimals that show two digits of `error`.
@@ -58,28 +60,24 @@ pub(crate) fn significant(x: f64, digits: usize) -> String {
     let exponent = x.abs().log10().floor() as i32;
     if (-3..6).contains(&exponent) {
         let d = (digits as i32 - 1 - exponent).max(0) as usize;
-        format!("{x:.d$}")
+        fixed(x, d)
     } else {
-        format!("{x:.*e}", digits - 1)
+        local(format!("{x:.*e}", digits - 1))
     }
 }
 
 /// A share as per cent, two digits.
 pub(crate) fn percent(share: f64) -> String {
-    if share.is_finite() {
-        format!("{} %", significant(100.0 * share, 2))
-    } else {
-        "unknown".into()
-    }
+    if share.is_finite() { format!("{} %", significant(100.0 * share, 2)) } else { tr!("unknown") }
 }
 
 /// Seconds, minutes or hours.
 pub(crate) fn duration(seconds: f64) -> String {
     match seconds {
-        s if !s.is_finite() => "unknown".into(),
+        s if !s.is_finite() => tr!("unknown"),
         s if s < 99.5 => format!("{s:.0} s"),
         s if s < 5_940.0 => format!("{:.0} min", s / 60.0),
-        s if s < DAY => format!("{:.1} h", s / HOUR),
+        s if s < DAY => format!("{} h", fixed(s / HOUR, 1)),
         s => format!("{:.0} d", s / DAY),
     }
 }
@@ -87,17 +85,18 @@ pub(crate) fn duration(seconds: f64) -> String {
 /// Large whole numbers with a prefix.
 pub(crate) fn count(n: f64) -> String {
     match n {
-        n if n < 10.0 => format!("{n:.1}"),
-        n if n < 1e3 => format!("{n:.0}"),
-        n if n < 1e6 => format!("{:.1} k", n / 1e3),
-        n if n < 1e9 => format!("{:.1} M", n / 1e6),
-        n => format!("{:.2} G", n / 1e9),
+        n if n < 10.0 => fixed(n, 1),
+        n if n < 1e3 => fixed(n, 0),
+        n if n < 1e6 => format!("{} k", fixed(n / 1e3, 1)),
+        n if n < 1e9 => format!("{} M", fixed(n / 1e6, 1)),
+        n => format!("{} G", fixed(n / 1e9, 2)),
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{Language, lang::speak};
 
     #[test]
     fn digits_follow_the_error() {
@@ -106,6 +105,19 @@ mod tests {
         assert_eq!(plus_minus(f64::NAN, 1.0, "N"), "unknown");
         assert_eq!(plus_minus(0.0, 1e-8, "N"), "(0.0 ± 1.0)e-8 N");
         assert_eq!(plus_minus(3e7, 1e6, "N"), "(3.00 ± 0.10)e7 N");
+    }
+
+    #[test]
+    fn numbers_are_written_as_the_language_writes_them() {
+        speak(Language::German);
+        assert_eq!(plus_minus(0.270_234, 0.000_312, "W/m²"), "0,27023 ± 0,00031 W/m²");
+        assert_eq!((percent(0.012_34), count(12_345.0)), ("1,2 %".into(), "12,3 k".into()));
+        assert_eq!(
+            (significant(2.06e-5, 3), duration(9_000.0)),
+            ("2,06e-5".into(), "2,5 h".into())
+        );
+        speak(Language::English);
+        assert_eq!(percent(0.012_34), "1.2 %");
     }
 
     #[test]

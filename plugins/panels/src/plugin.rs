@@ -47,11 +47,14 @@ impl Plugin for PanelsPlugin {
         app.init_resource::<Panels>()
             .init_resource::<Actions>()
             .init_resource::<Selection>()
+            .init_resource::<workspace::SystemLanguage>()
             .init_resource::<Look>()
             .init_resource::<Viewpoint>()
             .init_resource::<Statistics>()
             .init_resource::<Latest>()
             .init_resource::<history::History>()
+            .init_resource::<moment::Moment>()
+            .init_resource::<moment::Courses>()
             .init_resource::<Log>()
             .init_resource::<picture::Picture>()
             .init_resource::<picture::Cursor>()
@@ -92,7 +95,7 @@ impl Plugin for PanelsPlugin {
                 Update,
                 (
                     prediction::gather,
-                    history::keep,
+                    (history::keep, moment::follow),
                     refine::keep_time,
                     picture::develop,
                     fields::paint,

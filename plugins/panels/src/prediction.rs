@@ -116,9 +116,10 @@ pub(crate) fn gather(
         return;
     }
     if progress.is_cancelled() && !latest.cancelled {
-        log.say(format!(
+        log.say(tr!(
             "the prediction was cancelled: {} of {} pieces of work are done",
-            pieces.0, pieces.1
+            pieces.0,
+            pieces.1
         ));
     }
     (latest.pieces, latest.cancelled) = (pieces, progress.is_cancelled());
@@ -137,7 +138,7 @@ pub(crate) fn gather(
         // What nothing is known of any more is not what it was.
         latest.before.clear();
         if latest.result.is_none() && pieces.1 > 0 {
-            toasts.say(format!("The prediction of {} is done", scene.0.name));
+            toasts.say(tr!("The prediction of {} is done", scene.0.name));
         }
         latest.result = progress.prediction().map(Arc::new);
     }

@@ -9,7 +9,7 @@ use intrados_light::{
 };
 use intrados_stage::Pace;
 
-use crate::{Look, Statistics, Viewpoint, Workspace, workspace::Desk};
+use crate::{Look, Statistics, Viewpoint, Workspace, structure::Structure, workspace::Desk};
 
 /// Pause, target error and time spent.
 #[derive(Resource, Debug, Clone)]
@@ -52,9 +52,11 @@ pub(crate) fn share_frame(
     statistics: Res<Statistics>,
     viewpoint: Res<Viewpoint>,
     look: Res<Look>,
+    structure: Res<Structure>,
     mut pace: ResMut<Pace>,
 ) {
-    let is_hidden = desk.shown() == Workspace::Inspector && !desk.has_drawn("Render");
+    let is_seen = desk.has_drawn("Render") || structure.is_lit() && desk.has_drawn("Structure");
+    let is_hidden = desk.shown() == Workspace::Inspector && !is_seen;
     let rest =
         refine.paused || is_hidden || !viewpoint.is_preview() && refine.is_there(&statistics);
     let busy = !viewpoint.is_preview() && (statistics.is_due() || look.is_changed());

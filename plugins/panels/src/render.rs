@@ -14,6 +14,7 @@ use intrados_transport::Side;
 use crate::{
     Action, Actions, Look, Quantity, Refine, Selection, Statistics, Viewpoint,
     fields::{self, Fields},
+    lang::{drag, fixed, local, term},
     number::{count, duration, percent, plus_minus, significant},
     orbit,
     outline::Outline,
@@ -57,9 +58,9 @@ pub(crate) fn render(
     let response = ui.allocate_rect(rect, Sense::click_and_drag());
     let name = match look.quantity {
         Quantity::Field(side) if fields.painted(side).is_some() => {
-            format!("Picture: {}", fields::name(side))
+            tr!("Picture: {}", term(fields::name(side)))
         }
-        _ => "Picture".into(),
+        _ => tr!("Picture"),
     };
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, &name));
     ui.painter().rect_filled(rect, 0.0, Color32::BLACK);
@@ -94,13 +95,14 @@ pub(crate) fn render(
     match look.quantity {
         Quantity::Radiance => {}
         Quantity::Error => {
-            let caption = "relative standard error of a pixel (logarithmic; grey: unknown)";
-            colour_scale(ui, below, ERRORS, |error| format!("{} %", 100.0 * error), caption);
+            let caption = tr!("relative standard error of a pixel (logarithmic; grey: unknown)");
+            let share = |error: f32| local(format!("{} %", 100.0 * error));
+            colour_scale(ui, below, ERRORS, share, &caption);
         }
         Quantity::Field(side) => {
             if let Some(painted) = fields.painted(side) {
                 let [what, unit] = fields::meaning(side);
-                let caption = format!("{what}, {unit} (logarithmic; grey: unknown)");
+                let caption = tr!("{}, {} (logarithmic; grey: unknown)", term(what), unit);
                 colour_scale(
                     ui,
                     below,
@@ -117,11 +119,8 @@ pub(crate) fn render(
 fn field(ui: &Ui, rect: Rect, side: Side, learning: &Learning, fields: &mut Fields) {
     let painter = ui.painter();
     let Some(texture) = fields.texture(side, ui.ctx()) else {
-        let text = if learning.guide().is_some() {
-            "painting…".into()
-        } else {
-            steering::state(learning)
-        };
+        let text =
+            if learning.guide().is_some() { tr!("painting…") } else { steering::state(learning) };
         let font = egui::TextStyle::Body.resolve(ui.style());
         painter.text(rect.center(), egui::Align2::CENTER_CENTER, text, font, Color32::LIGHT_GRAY);
         return;
@@ -194,50 +193,46 @@ fn toolbar(
 ) {
     let mut new = **look;
     ui.horizontal(|ui| {
-        let pause = if refine.paused { "▶ Continue" } else { "⏸ Pause" };
+        let pause = if refine.paused { tr!("▶ Continue") } else { tr!("⏸ Pause") };
         if ui.button(pause).on_hover_text("Space").clicked() {
             actions.ask(Action::Pause);
         }
-        if ui
-            .button("⟲ Restart")
-            .on_hover_text("Begins the picture anew with the same seed (R)")
-            .clicked()
-        {
+        let hint = tr!("Begins the picture anew with the same seed (R)");
+        if ui.button(tr!("⟲ Restart")).on_hover_text(hint).clicked() {
             actions.ask(Action::Restart);
         }
         ui.separator();
         for (view, name, hint) in [
-            (View::Combined, "Combined", "Both sides, weighted by their variances (3)"),
-            (View::Primal, "Primal", "Walks from the camera to the lamps (1)"),
-            (View::Dual, "Dual", "Walks from the lamps to the camera (2)"),
+            (View::Combined, tr!("Combined"), tr!("Both sides, weighted by their variances (3)")),
+            (View::Primal, tr!("Primal"), tr!("Walks from the camera to the lamps (1)")),
+            (View::Dual, tr!("Dual"), tr!("Walks from the lamps to the camera (2)")),
         ] {
             ui.selectable_value(&mut new.view, view, name).on_hover_text(hint);
         }
         ui.separator();
         bounces(ui, &mut new);
         ui.separator();
-        ui.selectable_value(&mut new.quantity, Quantity::Radiance, "Light");
-        ui.selectable_value(&mut new.quantity, Quantity::Error, "Error")
-            .on_hover_text("Relative standard error of every pixel (E)");
+        ui.selectable_value(&mut new.quantity, Quantity::Radiance, tr!("Light"));
+        ui.selectable_value(&mut new.quantity, Quantity::Error, tr!("Error"))
+            .on_hover_text(tr!("Relative standard error of every pixel (E)"));
     });
     ui.horizontal(|ui| {
-        let label = ui.label("Exposure");
-        let slider =
-            egui::Slider::new(&mut new.exposure, -10.0..=10.0).suffix(" EV").fixed_decimals(1);
+        let label = ui.label(tr!("Exposure|photo"));
+        let slider = egui::Slider::new(&mut new.exposure, -10.0..=10.0)
+            .suffix(" EV")
+            .fixed_decimals(1)
+            .custom_formatter(|stops, _| fixed(stops, 1))
+            .custom_parser(|text| text.trim().replace(',', ".").parse().ok());
         ui.add(slider)
             .labelled_by(label.id)
-            .on_hover_text("Develops the picture anew, and does not restart it");
+            .on_hover_text(tr!("Develops the picture anew, and does not restart it"));
         ui.separator();
-        let label = ui
-            .label("Target error")
-            .on_hover_text("Relative standard error of the picture's mean at which refining rests");
+        let label = ui.label(tr!("Target error")).on_hover_text(tr!(
+            "Relative standard error of the picture's mean at which refining rests"
+        ));
         let mut target = 100.0 * refine.target;
-        let drag = egui::DragValue::new(&mut target)
-            .range(0.0001..=50.0)
-            .speed(0.001)
-            .max_decimals(4)
-            .suffix(" %");
-        if ui.add(drag).labelled_by(label.id).changed() {
+        let field = drag(&mut target).range(0.0001..=50.0).speed(0.001).max_decimals(4);
+        if ui.add(field.suffix(" %")).labelled_by(label.id).changed() {
             refine.target = target / 100.0;
         }
     });
@@ -254,21 +249,24 @@ fn toolbar(
 fn field_choice(ui: &mut Ui, look: &mut Look) {
     for side in Side::BOTH {
         let ([what, unit], walks) = (fields::meaning(side), steering::side_name(side));
-        let hint = format!(
-            "What steers the {walks} walks: {what}, {unit}. It is learnt while steering is on"
+        let hint = tr!(
+            "What steers the {} walks: {}, {}. It is learnt while steering is on",
+            walks,
+            term(what),
+            unit
         );
-        ui.selectable_value(&mut look.quantity, Quantity::Field(side), fields::name(side))
-            .on_hover_text(hint);
+        let name = term(fields::name(side));
+        ui.selectable_value(&mut look.quantity, Quantity::Field(side), name).on_hover_text(hint);
     }
 }
 
 fn bounces(ui: &mut Ui, look: &mut Look) {
     let name = |order: Option<usize>| match order {
-        None => "all bounces".to_owned(),
-        Some(0) => "0: lamps seen".to_owned(),
-        Some(k) if k + 1 == ORDERS => format!("{k} and more"),
-        Some(1) => "1 bounce".to_owned(),
-        Some(k) => format!("{k} bounces"),
+        None => tr!("all bounces"),
+        Some(0) => tr!("0: lamps seen"),
+        Some(k) if k + 1 == ORDERS => tr!("{} and more", k),
+        Some(1) => tr!("1 bounce"),
+        Some(k) => tr!("{} bounces", k),
     };
     let combo =
         egui::ComboBox::from_id_salt("bounces").width(104.0).selected_text(name(look.order));
@@ -279,7 +277,7 @@ fn bounces(ui: &mut Ui, look: &mut Look) {
     });
     combo
         .response
-        .on_hover_text("One term of the Neumann series alone: light after so many bounces");
+        .on_hover_text(tr!("One term of the Neumann series alone: light after so many bounces"));
 }
 
 fn status(
@@ -292,40 +290,43 @@ fn status(
 ) {
     let now = statistics.now().filter(|_| !viewpoint.is_preview());
     let Some(now) = now else {
-        ui.horizontal(|ui| ui.weak(if viewpoint.is_preview() { "Preview" } else { "…" }));
+        let why = if viewpoint.is_preview() { tr!("Preview") } else { "…".into() };
+        ui.horizontal(|ui| ui.weak(why));
         ui.horizontal(|ui| ui.weak(" "));
         return;
     };
     ui.horizontal(|ui| {
         let there = refine.is_there(statistics);
         ui.strong(match () {
-            () if refine.paused => "⏸ Paused",
-            () if there => "✔ Target reached",
-            () => "Refining",
+            () if refine.paused => tr!("⏸ Paused"),
+            () if there => tr!("✔ Target reached"),
+            () => tr!("Refining"),
         });
         if !there && now.error() <= refine.target {
-            ui.label("target reached, but by an error bar that may not be trusted")
+            ui.label(tr!("target reached, but by an error bar that may not be trusted"))
                 .on_hover_text(now.trust.words());
         } else if !there && now.error().is_finite() {
             let left = duration(refine.seconds_left(now.error()));
-            ui.label(format!("target in {left}")).on_hover_text(
-                "By the law of large numbers: the error falls with the root of the time",
-            );
+            ui.label(tr!("target in {}", left)).on_hover_text(tr!(
+                "By the law of large numbers: the error falls with the root of the time"
+            ));
         }
         ui.separator();
-        let size = render.map_or(String::new(), |r| {
-            format!("{} × {} pixels, ", r.camera().width, r.camera().height)
+        let samples = count(now.samples_per_pixel);
+        ui.label(match render.map(|r| r.camera()) {
+            Some(c) => tr!("{} × {} pixels, {} samples each", c.width, c.height, samples),
+            None => tr!("{} samples each", samples),
         });
-        ui.label(format!("{size}{} samples each", count(now.samples_per_pixel)));
         ui.separator();
-        ui.label(format!("{}, {:.1} CPU-s", duration(refine.seconds), now.cpu_seconds));
+        let work = fixed(now.cpu_seconds, 1);
+        ui.label(format!("{}, {work} CPU-s", duration(refine.seconds)));
     });
     ui.horizontal(|ui| {
         if let Some(reading) = now.reading(look.view) {
-            ui.label(format!("Mean {}", plus_minus(reading.mean, reading.std_error, "W/(m² sr)")))
-                .on_hover_text("Mean luminance of the picture");
+            let mean = plus_minus(reading.mean, reading.std_error, "W/(m² sr)");
+            ui.label(tr!("Mean {}", mean)).on_hover_text(tr!("Mean luminance of the picture"));
             if reading.rel_error().is_finite() {
-                ui.label(format!("({})", percent(reading.rel_error()))).on_hover_text(format!(
+                ui.label(format!("({})", percent(reading.rel_error()))).on_hover_text(tr!(
                     "Relative standard error of the mean. A single pixel's is about {}.",
                     percent(now.pixel_noise())
                 ));
@@ -336,7 +337,7 @@ fn status(
             ui.separator();
         }
         if let Some(z) = now.z {
-            ui.label("Gap");
+            ui.label(tr!("Gap"));
             crate::meters::gap(ui, z, now.both_converged);
             ui.separator();
         }
@@ -346,14 +347,15 @@ fn status(
 
 fn convergence(ui: &mut Ui, trust: &Trust) {
     if trust.is_certified() {
-        ui.label("✔ Converged").on_hover_text(
-            "No walk dominates, the halves agree, the tail of the scores is light, and the other side has met no light that is missing: the error bar may be trusted",
-        );
+        ui.label(tr!("✔ Converged")).on_hover_text(tr!(
+            "No walk dominates, the halves agree, the tail of the scores is light, and the other \
+             side has met no light that is missing: the error bar may be trusted"
+        ));
     } else if trust.is_settled() {
-        ui.label("Converged, not checked").on_hover_text(trust.words());
+        ui.label(tr!("Converged, not checked")).on_hover_text(trust.words());
     } else {
-        ui.label("⚠ Not converged")
-            .on_hover_text(format!("The error bar may be too small: {}", trust.words()));
+        ui.label(tr!("⚠ Not converged"))
+            .on_hover_text(tr!("The error bar may be too small: {}", trust.words()));
     }
 }
 

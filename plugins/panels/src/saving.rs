@@ -16,7 +16,9 @@ use intrados_stage::{
     file::{self, file_name},
 };
 
-use crate::{Action, Actions, Banners, Latest, Log, export::write_png, report, toast::Toasts};
+use crate::{
+    Action, Actions, Banners, Latest, Log, export::write_png, lang::term, report, toast::Toasts,
+};
 
 /// What can be saved.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -29,14 +31,11 @@ pub enum Taken {
     Picture(Option<String>),
 }
 
-/// Tables by their names, and what is in them.
-const TABLES: [(&str, &str); 5] = [
-    ("members", "Members…"),
-    ("zones", "Zones of members…"),
-    ("defects", "Defects…"),
-    ("slices", "CT slices…"),
-    ("evidence", "Evidence, used or not…"),
-];
+/// What was written, and where to; of a report, how many files.
+pub(crate) struct Written {
+    pub(crate) files: Option<usize>,
+    pub(crate) path: PathBuf,
+}
 
 /// The sheet that asks where to, and what is being written.
 #[derive(Resource, Default)]
@@ -44,7 +43,7 @@ pub(crate) struct Saving {
     shown: Option<Taken>,
     path: String,
     with_pdf: bool,
-    task: Option<Task<Result<String, String>>>,
+    task: Option<Task<Result<Written, String>>>,
     /// A picture that is to be taken of the window, once it is drawn.
     wanted: Option<(PathBuf, Option<Rect>)>,
     /// Where it comes, once it was asked for.
@@ -94,30 +93,42 @@ impl Saving {
 
 /// Entries of the menu.
 pub(crate) fn menu(ui: &mut Ui, has_prediction: bool, asked: &mut Vec<Action>) {
-    let hint = "report.html, BCF for the model's authors, tables as CSV, the members coloured by damage as GLB and VTU";
-    let report = ui.add_enabled(has_prediction, Button::new("Report…").shortcut_text("Ctrl+S"));
+    let hint = tr!(
+        "report.html, BCF for the model's authors, tables as CSV, the members coloured by damage \
+         as GLB and VTU"
+    );
+    let report = Button::new(tr!("Report…")).shortcut_text("Ctrl+S");
+    let report = ui.add_enabled(has_prediction, report);
     if report.on_hover_text(hint).clicked() {
         asked.push(Action::Save(Taken::Report));
     }
-    ui.menu_button("Table as CSV", |ui| {
-        for (name, title) in TABLES {
+    ui.menu_button(tr!("Table as CSV"), |ui| {
+        for (name, title) in [
+            ("members", tr!("Members…")),
+            ("zones", tr!("Zones of members…")),
+            ("defects", tr!("Defects…")),
+            ("slices", tr!("CT slices…")),
+            ("evidence", tr!("Evidence, used or not…")),
+        ] {
             if ui.add_enabled(has_prediction, Button::new(title)).clicked() {
                 asked.push(Action::Save(Taken::Table(name)));
             }
         }
     });
     ui.separator();
-    if ui.button("Picture of the structure, with legend…").clicked() {
+    if ui.button(tr!("Picture of the structure, with legend…")).clicked() {
         asked.push(Action::Save(Taken::Picture(Some("Structure".into()))));
     }
-    if ui.add(Button::new("Picture of the window…").shortcut_text("F12")).clicked() {
+    let window = Button::new(tr!("Picture of the window…")).shortcut_text("F12");
+    if ui.add(window).clicked() {
         asked.push(Action::Save(Taken::Picture(None)));
     }
-    if ui.add(Button::new("Picture of light, PNG or EXR…").shortcut_text("Ctrl+E")).clicked() {
+    let light = Button::new(tr!("Picture of light, PNG or EXR…")).shortcut_text("Ctrl+E");
+    if ui.add(light).clicked() {
         asked.push(Action::Export);
     }
     if !has_prediction {
-        ui.weak("Report and tables come with the prediction.");
+        ui.weak(tr!("Report and tables come with the prediction."));
     }
 }
 
@@ -135,37 +146,38 @@ pub(crate) fn sheet(
     let is_report = what == Taken::Report;
     ui.label(match &what {
         Taken::Report => {
-            "HTML, BCF, tables and models, as `intrados predict --out` writes them.".into()
+            tr!("HTML, BCF, tables and models, as `intrados predict --out` writes them.")
         }
-        Taken::Table(name) => format!("The table of {name}: UTF-8, units in the header."),
-        Taken::Picture(_) => "PNG, as it is seen now.".to_owned(),
+        Taken::Table(name) => tr!("The table of {}: UTF-8, units in the header.", term(name)),
+        Taken::Picture(_) => tr!("PNG, as it is seen now."),
     });
     ui.horizontal(|ui| {
-        let label = ui.label(if is_report { "Folder to write" } else { "File to write" });
+        let name = if is_report { tr!("Folder to write") } else { tr!("File to write") };
+        let label = ui.label(name);
         ui.add(TextEdit::singleline(&mut saving.path).desired_width(280.0)).labelled_by(label.id);
-        if ui.button("Browse…").clicked() {
+        if ui.button(tr!("Browse…")).clicked() {
             actions.ask(Action::ChooseSave);
         }
     });
     if is_report {
         let can = pdf::printer().is_some();
-        ui.add_enabled_ui(can, |ui| ui.checkbox(&mut saving.with_pdf, "and report.pdf"));
+        ui.add_enabled_ui(can, |ui| ui.checkbox(&mut saving.with_pdf, tr!("and report.pdf")));
         if !can {
-            ui.weak(pdf::BY_HAND);
+            ui.weak(term(pdf::BY_HAND));
         }
     }
     let result = latest.result_for(&scene.0).cloned();
     let needs = !matches!(what, Taken::Picture(_));
     let why_not = if saving.path.trim().is_empty() {
-        Some("It needs a name.")
+        Some(tr!("It needs a name."))
     } else if needs && result.is_none() {
-        Some("The prediction is not done yet.")
+        Some(tr!("The prediction is not done yet."))
     } else {
         None
     };
     ui.horizontal(|ui| {
         let may = why_not.is_none() && saving.task.is_none();
-        if ui.add_enabled(may, Button::new("Save")).clicked() {
+        if ui.add_enabled(may, Button::new(tr!("Save"))).clicked() {
             let path = PathBuf::from(saving.path.trim());
             match (what, result) {
                 (Taken::Picture(panel), _) => actions.ask(Action::TakePicture(path, panel)),
@@ -186,7 +198,7 @@ pub(crate) fn sheet(
             }
             saving.shown = None;
         }
-        if ui.button("Cancel").clicked() {
+        if ui.button(tr!("Cancel")).clicked() {
             saving.shown = None;
         }
         if let Some(why) = why_not {
@@ -200,12 +212,13 @@ fn table(
     path: PathBuf,
     result: Arc<Prediction>,
     jobs: &mut Jobs,
-) -> Task<Result<String, String>> {
-    Task::spawn(jobs, format!("writing {}", path.display()), move |_| {
+) -> Task<Result<Written, String>> {
+    Task::spawn(jobs, tr!("writing {}", path.display()), move |_| {
         let all = tables(&result);
         let text = all.iter().find(|t| t.0 == name).map_or("", |t| t.1.as_str());
         let written = file::put(&path, |out| out.write_all(text.as_bytes()));
-        written.map(|()| path.display().to_string()).map_err(|e| format!("{}: {e}", path.display()))
+        written.map_err(|e| format!("{}: {e}", path.display()))?;
+        Ok(Written { files: None, path })
     })
 }
 
@@ -232,15 +245,14 @@ pub(crate) fn picture(ui: &Ui, world: &mut World) {
         saving.coming = None;
         let density = ui.ctx().pixels_per_point();
         let mut jobs = world.resource_mut::<Jobs>();
-        let label = format!("writing {}", path.display());
+        let label = tr!("writing {}", path.display());
         saving.task = Some(Task::spawn(&mut jobs, label, move |_| {
             let part = match of {
                 Some(rect) => cut(&image, rect, density),
                 None => ColorImage::clone(&image),
             };
-            let written = write_png(&part, &path);
-            let named = path.display();
-            written.map(|()| named.to_string()).map_err(|e| format!("{named}: {e}"))
+            write_png(&part, &path).map_err(|e| format!("{}: {e}", path.display()))?;
+            Ok(Written { files: None, path })
         }));
     }
     *world.resource_mut::<Saving>() = saving;
@@ -265,13 +277,15 @@ pub(crate) fn take(
 ) {
     let Some(done) = Task::take(&mut saving.bypass_change_detection().task) else { return };
     match done {
-        Ok(Ok(what)) => {
-            toasts.say(format!("Saved {what}"));
-            log.say(format!("saved {what}"));
+        Ok(Ok(Written { files, path })) => {
+            let path = path.display();
+            let what = files.map_or_else(|| path.to_string(), |n| tr!("{} files into {}", n, path));
+            toasts.say(tr!("Saved {}", what));
+            log.say(tr!("saved {}", what));
         }
         Ok(Err(why)) => {
-            log.say(format!("⚠ not saved: {why}"));
-            banners.cannot("Not saved", &why);
+            log.say(tr!("⚠ not saved: {}", why));
+            banners.cannot(&tr!("Not saved"), &why);
         }
         // What a panic said is told with all others.
         Err(_) => {}

@@ -177,15 +177,15 @@ pub(crate) fn offer(ui: &mut Ui, world: &mut World) {
     let Some(left) = world.resource::<Session>().left.clone() else { return };
     Side::top("session").show(ui, |ui| {
         ui.horizontal_wrapped(|ui| {
-            ui.label(format!("The last session was not ended: {}.", left.scene.display()));
+            ui.label(tr!("The last session was not ended: {}.", left.scene.display()));
             if left.form.is_some() || left.photograph.is_some() {
-                ui.label("What was filled in there and not saved is kept.");
+                ui.label(tr!("What was filled in there and not saved is kept."));
             }
             let session = &mut *world.resource_mut::<Session>();
-            if ui.button("Go on with it").clicked() {
+            if ui.button(tr!("Go on with it")).clicked() {
                 session.coming = session.left.take();
                 world.resource_mut::<Actions>().ask(Action::Open(left.scene));
-            } else if ui.button("Forget it").clicked() {
+            } else if ui.button(tr!("Forget it")).clicked() {
                 session.left = None;
             }
         });

@@ -7,7 +7,7 @@ use egui::{Button, RichText, ScrollArea, TextFormat, Ui, text::LayoutJob};
 use intrados_scene::{Card, cards, plugin::CurrentScene};
 use intrados_stage::Jobs;
 
-use crate::{Action, Actions, dialog::Dialogs, log, recent::Recent};
+use crate::{Action, Actions, dialog::Dialogs, lang::term, log, recent::Recent};
 
 /// The bundled scenes: those with structural members first.
 #[derive(Debug)]
@@ -35,10 +35,10 @@ pub(crate) fn start(
         let margin = ((ui.available_width() - 900.0) / 2.0).max(12.0) as i8;
         egui::Frame::new().inner_margin(egui::Margin::symmetric(margin, 28)).show(ui, |ui| {
             ui.label(RichText::new("Intrados").size(34.0).strong());
-            ui.label("Predicts damage in columns, beams and tunnel linings, and shows it.");
+            ui.label(tr!("Predicts damage in columns, beams and tunnel linings, and shows it."));
             ui.add_space(18.0);
             if let Some(scene) = scene
-                && ui.button(format!("⬅ Back to {}", scene.0.name)).clicked()
+                && ui.button(tr!("⬅ Back to {}", scene.0.name)).clicked()
             {
                 actions.ask(Action::StartScreen(false));
             }
@@ -48,8 +48,8 @@ pub(crate) fn start(
             ui.add_space(14.0);
             let (structures, tests): (Vec<&Card>, Vec<&Card>) =
                 cards.0.iter().partition(|c| c.has_members);
-            section(ui, "Structures", &structures, actions);
-            section(ui, "Test scenes of light transport", &tests, actions);
+            section(ui, &tr!("Structures"), &structures, actions);
+            section(ui, &tr!("Test scenes of light transport"), &tests, actions);
             recent_files(ui, recent.list(), actions);
         });
     });
@@ -58,20 +58,20 @@ pub(crate) fn start(
 fn open_row(ui: &mut Ui, path: &mut String, dialog_is_open: bool, actions: &mut Actions) {
     ui.horizontal_wrapped(|ui| {
         let button =
-            Button::new(RichText::new("Open…").size(16.0)).min_size(egui::vec2(110.0, 34.0));
+            Button::new(RichText::new(tr!("Open…")).size(16.0)).min_size(egui::vec2(110.0, 34.0));
         if ui.add_enabled(!dialog_is_open, button).on_hover_text("Ctrl+O").clicked() {
             actions.ask(Action::Choose);
         }
-        let new = Button::new(RichText::new("New structure…").size(16.0));
-        let hint = "From a template of a column, a beam or a tunnel (Ctrl+N)";
+        let new = Button::new(RichText::new(tr!("New structure…")).size(16.0));
+        let hint = tr!("From a template of a column, a beam or a tunnel (Ctrl+N)");
         if ui.add(new.min_size(egui::vec2(110.0, 34.0))).on_hover_text(hint).clicked() {
             actions.ask(Action::New);
         }
-        ui.label("or drop a .ron, .glb, .gltf or .ifc file here, or its path:");
-        let field = ui
-            .add(egui::TextEdit::singleline(path).desired_width(240.0).hint_text("path of a file"));
+        ui.label(tr!("or drop a .ron, .glb, .gltf or .ifc file here, or its path:"));
+        let field = egui::TextEdit::singleline(path).desired_width(240.0);
+        let field = ui.add(field.hint_text(tr!("path of a file")));
         let entered = field.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter));
-        let go = ui.add_enabled(!path.trim().is_empty(), Button::new("Open path"));
+        let go = ui.add_enabled(!path.trim().is_empty(), Button::new(tr!("Open path")));
         if (entered || go.clicked()) && !path.trim().is_empty() {
             actions.ask(Action::Open(PathBuf::from(path.trim())));
         }
@@ -114,7 +114,7 @@ fn text(ui: &Ui, card: &Card) -> LayoutJob {
     let mut job = LayoutJob::default();
     job.append(card.name, 0.0, format(16.0, ui.visuals().strong_text_color()));
     job.append("\n", 0.0, format(12.0, ui.visuals().text_color()));
-    job.append(&card.title, 0.0, format(12.5, ui.visuals().text_color()));
+    job.append(&term(&card.title), 0.0, format(12.5, ui.visuals().text_color()));
     job
 }
 
@@ -122,14 +122,14 @@ fn recent_files(ui: &mut Ui, recent: &[PathBuf], actions: &mut Actions) {
     if recent.is_empty() {
         return;
     }
-    ui.label(RichText::new("Recent").size(17.0).strong());
+    ui.label(RichText::new(tr!("Recent")).size(17.0).strong());
     for (i, path) in recent.iter().enumerate() {
         ui.push_id(i, |ui| {
             ui.horizontal(|ui| {
                 if recent_button(ui, path).clicked() {
                     actions.ask(Action::Open(path.clone()));
                 }
-                if ui.small_button("✖").on_hover_text("Take it off this list").clicked() {
+                if ui.small_button("✖").on_hover_text(tr!("Take it off this list")).clicked() {
                     actions.ask(Action::Forget(path.clone()));
                 }
             });
@@ -141,5 +141,9 @@ fn recent_files(ui: &mut Ui, recent: &[PathBuf], actions: &mut Actions) {
 pub(crate) fn recent_button(ui: &mut Ui, path: &Path) -> egui::Response {
     let is_there = path.exists();
     let button = ui.add_enabled(is_there, Button::new(path.display().to_string()).frame(false));
-    if is_there { button } else { button.on_disabled_hover_text("This file is not there any more") }
+    if is_there {
+        button
+    } else {
+        button.on_disabled_hover_text(tr!("This file is not there any more"))
+    }
 }

@@ -8,7 +8,7 @@ use intrados_light::{Measurement, MeterReading, Render, Summary, Trust, View};
 use intrados_scene::Camera;
 use intrados_transport::{Side, WalkEstimate, figure_of_merit};
 
-use crate::Viewpoint;
+use crate::{Viewpoint, lang::fixed};
 
 /// How often the film is summed up.
 const EVERY: Duration = Duration::from_millis(500);
@@ -66,19 +66,19 @@ impl Now {
     pub(crate) fn mixture(&self) -> String {
         match (self.primal, self.dual) {
             (Some(_), Some(_)) if self.share >= 1.0 => {
-                "primal alone: the dual would make it worse".into()
+                tr!("primal alone: the dual would make it worse")
             }
             (Some(_), Some(_)) if self.share <= 0.0 => {
-                "dual alone: the primal would make it worse".into()
+                tr!("dual alone: the primal would make it worse")
             }
-            (Some(_), Some(_)) => format!(
-                "{:.0} % primal, {:.0} % dual",
-                100.0 * self.share,
-                100.0 * (1.0 - self.share)
+            (Some(_), Some(_)) => tr!(
+                "{} % primal, {} % dual",
+                fixed(100.0 * self.share, 0),
+                fixed(100.0 * (1.0 - self.share), 0)
             ),
-            (Some(_), None) => "primal alone: the dual is not walked".into(),
-            (None, Some(_)) => "dual alone: the primal is not walked".into(),
-            (None, None) => "nothing is walked".into(),
+            (Some(_), None) => tr!("primal alone: the dual is not walked"),
+            (None, Some(_)) => tr!("dual alone: the primal is not walked"),
+            (None, None) => tr!("nothing is walked"),
         }
     }
 

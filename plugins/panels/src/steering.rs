@@ -10,6 +10,7 @@ use crate::{
     Statistics,
     chart::{by_cpu_seconds, decades, key, place, plot, power},
     colours,
+    lang::fixed,
     number::{percent, significant},
 };
 
@@ -45,11 +46,11 @@ pub(crate) fn steering(
 /// Lets the user choose, and says what has become of it.
 pub(crate) fn choice(ui: &mut Ui, learning: &mut ResMut<Learning>) {
     let name = |steering: Steering| match steering {
-        Steering::Off => "off",
-        Steering::Auto => "where it pays",
-        Steering::On => "on",
+        Steering::Off => tr!("off"),
+        Steering::Auto => tr!("where it pays"),
+        Steering::On => tr!("on"),
     };
-    let label = ui.label("Steering");
+    let label = ui.label(tr!("Steering"));
     let mut chosen = learning.steering;
     let combo = ComboBox::from_id_salt("steering")
         .width(104.0)
@@ -59,9 +60,10 @@ pub(crate) fn choice(ui: &mut Ui, learning: &mut ResMut<Learning>) {
                 ui.selectable_value(&mut chosen, steering, name(steering));
             }
         });
-    combo.response.labelled_by(label.id).on_hover_text(
-        "Primal and dual walks teach each other where to go. It is learnt aside, for this camera; then the picture begins anew",
-    );
+    combo.response.labelled_by(label.id).on_hover_text(tr!(
+        "Primal and dual walks teach each other where to go. It is learnt aside, for this camera; \
+         then the picture begins anew"
+    ));
     if chosen != learning.steering {
         learning.steering = chosen;
     }
@@ -70,22 +72,22 @@ pub(crate) fn choice(ui: &mut Ui, learning: &mut ResMut<Learning>) {
 /// In a few words.
 pub(crate) fn state(learning: &Learning) -> String {
     let steers = |guide: &Guide| match Side::BOTH.map(|side| guide.steers(side)) {
-        [true, true] => "steers both sides",
-        [true, false] => "steers the primal side",
-        [false, true] => "steers the dual side",
-        [false, false] => "does not pay here",
+        [true, true] => tr!("steers both sides"),
+        [true, false] => tr!("steers the primal side"),
+        [false, true] => tr!("steers the dual side"),
+        [false, false] => tr!("does not pay here"),
     };
     match (learning.guide(), learning.progress()) {
-        _ if learning.steering == Steering::Off => "nothing is learnt while steering is off".into(),
-        _ if !learning.is_possible() => "only next-event walks can be steered".into(),
-        (Some(guide), _) => steers(guide).into(),
-        (None, Some(done)) => format!("learns: {:.0} %", 100.0 * done),
-        (None, None) => "learns as soon as the camera rests".into(),
+        _ if learning.steering == Steering::Off => tr!("nothing is learnt while steering is off"),
+        _ if !learning.is_possible() => tr!("only next-event walks can be steered"),
+        (Some(guide), _) => steers(guide),
+        (None, Some(done)) => tr!("learns: {} %", fixed(100.0 * done, 0)),
+        (None, None) => tr!("learns as soon as the camera rests"),
     }
 }
 
-pub(crate) fn side_name(side: Side) -> &'static str {
-    if side == Side::Primal { "primal" } else { "dual" }
+pub(crate) fn side_name(side: Side) -> String {
+    if side == Side::Primal { tr!("primal") } else { tr!("dual") }
 }
 
 /// How many times the merit of a side's unsteered walks its steered ones had when both were last
@@ -108,23 +110,28 @@ fn facts(ui: &mut Ui, guide: &Guide, culprits: &[Culprit], render: Option<&Rende
             for side in Side::BOTH {
                 ui.weak(side_name(side));
                 let gain = match gain(guide, side) {
-                    Some(gain) if gain.is_finite() => format!("merit × {}", significant(gain, 2)),
-                    Some(gain) if gain > 0.0 => "found only so".into(),
-                    _ => "not compared".into(),
+                    Some(gain) if gain.is_finite() => tr!("merit × {}", significant(gain, 2)),
+                    Some(gain) if gain > 0.0 => tr!("found only so"),
+                    _ => tr!("not compared"),
                 };
-                let steers = if guide.steers(side) { "steered" } else { "not steered" };
-                ui.label(format!("{steers}: {gain}")).on_hover_text(
-                    "Figure of merit of steered walks over unsteered ones' in the rounds of learning, on a scale of work that knows no clock. \
-                     Where it is below 1, steering does not pay. Not compared: a field steered this side's walks from the first round on",
-                );
+                let steers = if guide.steers(side) { tr!("steered") } else { tr!("not steered") };
+                ui.label(format!("{steers}: {gain}")).on_hover_text(tr!(
+                    "Figure of merit of steered walks over unsteered ones' in the rounds of \
+                     learning, on a scale of work that knows no clock. Where it is below 1, \
+                     steering does not pay. Not compared: a field steered this side's walks from \
+                     the first round on"
+                ));
                 ui.end_row();
-                ui.weak("  residual").on_hover_text("What a step of a walk brought over what the field had promised: 1 if the field is right");
+                ui.weak(format!("  {}", tr!("residual"))).on_hover_text(tr!(
+                    "What a step of a walk brought over what the field had promised: 1 if the \
+                     field is right"
+                ));
                 ui.label(residual(side, culprits, render));
                 ui.end_row();
             }
             for (name, value) in [
-                ("memory", format!("{} of fields", bytes(guide.bytes()))),
-                ("learning", format!("{} CPU-s", significant(guide.cpu_seconds, 2))),
+                (tr!("memory"), tr!("{} of fields", bytes(guide.bytes()))),
+                (tr!("learning"), format!("{} CPU-s", significant(guide.cpu_seconds, 2))),
             ] {
                 ui.weak(name);
                 ui.label(value);
@@ -145,9 +152,9 @@ fn residual(side: Side, culprits: &[Culprit], render: Option<&Render>) -> String
         render.and_then(|r| r.exposure(side)).filter(|e| e.field != 0).map(|e| e.max_residual);
     let largest = learnt.max(walked.unwrap_or(0.0));
     if steps > 0.0 {
-        format!("mean {mean:.3}, largest {}", significant(largest, 2))
+        tr!("mean {}, largest {}", fixed(mean, 3), significant(largest, 2))
     } else {
-        "unknown".into()
+        tr!("unknown")
     }
 }
 
@@ -163,9 +170,10 @@ fn bytes(n: usize) -> String {
 /// relVar of a walk in each round of learning.
 fn course(ui: &mut Ui, guide: &Guide) {
     ui.horizontal(|ui| {
-        ui.label("relVar of a walk by round").on_hover_text("Squares: no field steered them yet");
-        key(ui, "primal", colours::PRIMAL, false);
-        key(ui, "dual", colours::DUAL, true);
+        let hint = tr!("Squares: no field steered them yet");
+        ui.label(tr!("relVar of a walk by round")).on_hover_text(hint);
+        key(ui, &tr!("primal"), colours::PRIMAL, false);
+        key(ui, &tr!("dual"), colours::DUAL, true);
     });
     let of = |side: Side| {
         let rounds = guide.rounds().iter().filter(move |r| r.side == side).zip(1..);
@@ -191,7 +199,7 @@ fn course(ui: &mut Ui, guide: &Guide) {
         .y_axis_formatter(|mark, _| power(mark))
         .label_formatter(|hover| {
             let p = place(hover);
-            Some(format!("{} in round {:.0}", significant(10_f64.powf(p.y), 2), p.x))
+            Some(tr!("{} in round {}", significant(10_f64.powf(p.y), 2), fixed(p.x, 0)))
         })
         .show(ui, |plot| {
             for (side, colour, style) in [
@@ -201,9 +209,8 @@ fn course(ui: &mut Ui, guide: &Guide) {
                 let name = side_name(side);
                 let rounds = of(side);
                 let points: Vec<[f64; 2]> = rounds.iter().map(|(_, point)| *point).collect();
-                plot.line(
-                    Line::new(name, PlotPoints::new(points)).color(colour).style(style).width(2.0),
-                );
+                let line = Line::new(name.clone(), PlotPoints::new(points));
+                plot.line(line.color(colour).style(style).width(2.0));
                 for (steered, shape) in [(false, MarkerShape::Square), (true, MarkerShape::Circle)]
                 {
                     let points: Vec<[f64; 2]> = rounds
@@ -212,7 +219,7 @@ fn course(ui: &mut Ui, guide: &Guide) {
                         .map(|(_, point)| *point)
                         .collect();
                     plot.points(
-                        Points::new(name, PlotPoints::new(points))
+                        Points::new(name.clone(), PlotPoints::new(points))
                             .color(colour)
                             .shape(shape)
                             .radius(4.0),
@@ -241,24 +248,25 @@ fn merit(ui: &mut Ui, guide: &Guide, statistics: &Statistics, render: Option<&Re
     let before =
         render.and_then(|r| statistics.unsteered(r.camera())).filter(|_| is_steered).and_then(log);
     ui.horizontal(|ui| {
-        ui.label("Figure of merit by CPU-s")
-            .on_hover_text("1/(relVar of the picture's mean · CPU-seconds), learning counted. Flat: the error falls as it should");
+        ui.label(tr!("Figure of merit by CPU-s")).on_hover_text(tr!(
+            "1/(relVar of the picture's mean · CPU-seconds), learning counted. Flat: the error \
+             falls as it should"
+        ));
         if before.is_some() {
-            key(ui, "unsteered", colours::UNKNOWN, true);
+            key(ui, &tr!("unsteered"), colours::UNKNOWN, true);
         }
     });
     by_cpu_seconds("merit").show(ui, |plot| {
         if let Some(before) = before {
             plot.hline(
-                HLine::new("unsteered", before)
+                HLine::new(tr!("unsteered"), before)
                     .color(colours::UNKNOWN)
                     .style(LineStyle::dashed_loose())
                     .width(2.0),
             );
         }
-        plot.line(
-            Line::new("picture", PlotPoints::new(points)).color(colours::COMBINED).width(2.0),
-        );
+        let line = Line::new(tr!("picture"), PlotPoints::new(points));
+        plot.line(line.color(colours::COMBINED).width(2.0));
     });
 }
 
@@ -269,12 +277,15 @@ fn surfaces(ui: &mut Ui, culprits: &[Culprit]) {
     ScrollArea::both().id_salt("surfaces").auto_shrink(false).show(ui, |ui| {
         Grid::new("surfaces").num_columns(6).striped(true).show(ui, |ui| {
             for (title, hint) in [
-                ("Surface", "Where the steps set out from"),
-                ("side", "Whose walks"),
-                ("share", "Of the side's variance, in the last round of learning"),
-                ("mean", "Of what steps brought over what was promised: 1 if the field is right"),
-                ("largest", "Of the same"),
-                ("steps", "A walk"),
+                (tr!("Surface"), tr!("Where the steps set out from")),
+                (tr!("side"), tr!("Whose walks")),
+                (tr!("share"), tr!("Of the side's variance, in the last round of learning")),
+                (
+                    tr!("mean"),
+                    tr!("Of what steps brought over what was promised: 1 if the field is right"),
+                ),
+                (tr!("largest"), tr!("Of the same")),
+                (tr!("steps"), tr!("A walk")),
             ] {
                 ui.strong(title).on_hover_text(hint);
             }
@@ -283,14 +294,14 @@ fn surfaces(ui: &mut Ui, culprits: &[Culprit]) {
                 ui.label(&c.surface);
                 ui.label(side_name(c.side));
                 ui.label(percent(c.rel_var / totals[c.side as usize]));
-                ui.label(format!("{:.3}", c.mean));
+                ui.label(fixed(c.mean, 3));
                 ui.label(significant(c.largest, 2));
                 ui.label(significant(c.steps, 2));
                 ui.end_row();
             }
         });
         if culprits.len() > SURFACES {
-            ui.weak(format!("and {} more", culprits.len() - SURFACES));
+            ui.weak(tr!("and {} more", culprits.len() - SURFACES));
         }
     });
 }

@@ -3,6 +3,8 @@
 use egui::{Grid, RichText, ScrollArea, TextEdit, Ui};
 use intrados_scene::attach::{Field, FieldKind, Setting};
 
+use crate::lang::term;
+
 /// Width of a field, points, and of one that holds words.
 const WIDTHS: (f32, f32) = (70.0, 120.0);
 /// So many changed fields are named in the line that can be undone.
@@ -42,15 +44,15 @@ impl Values {
     /// What is to be written, and the names of what changes; or what has to be typed otherwise.
     pub(crate) fn settings(&self) -> Result<(Vec<Setting>, String), String> {
         let mut settings = Vec::new();
-        let mut names: Vec<&str> = Vec::new();
+        let mut names = Vec::new();
         for (field, text) in self.pairs() {
             settings.extend(field.set(text)?);
-            names.push(&field.name);
+            names.push(term(&field.name));
         }
         let more = names.len().saturating_sub(NAMED);
         names.truncate(NAMED);
-        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
-        Ok((settings, names.join(", ") + &more))
+        let named = names.join(", ");
+        Ok((settings, if more > 0 { tr!("{} and {} more", named, more) } else { named }))
     }
 
     /// Draws them by their groups, names on the left.
@@ -62,9 +64,9 @@ impl Values {
             let range = from..from + own;
             // What concerns all of a group is said once.
             let is_common = self.fields[range.clone()].iter().all(|f| f.note == first.note);
-            let common = first.note.clone();
+            let common = term(&first.note);
             ui.horizontal_wrapped(|ui| {
-                ui.label(RichText::new(&group).strong());
+                ui.label(RichText::new(term(&group)).strong());
                 if is_common && own > 1 {
                     ui.weak(common);
                 }
@@ -83,26 +85,26 @@ impl Values {
 /// A value with its name and its unit.
 fn row(ui: &mut Ui, field: &Field, text: &mut String) {
     let is_changed = field.value != text.trim();
-    let name = RichText::new(&field.name);
+    let name = RichText::new(term(&field.name));
     let label = ui.label(if is_changed { name.strong() } else { name });
-    let label =
-        if field.note.is_empty() { label } else { label.on_hover_text(field.note.as_str()) };
+    let note = term(&field.note);
+    let label = if note.is_empty() { label } else { label.on_hover_text(&note) };
     ui.horizontal(|ui| {
         let is_word = matches!(field.kind, FieldKind::Text | FieldKind::OneOf(_));
         let width = if is_word { WIDTHS.1 } else { WIDTHS.0 };
         let choice = if matches!(field.kind, FieldKind::OneOf(_)) { 26.0 } else { 0.0 };
         let width = width.min(ui.available_width() - choice).max(40.0);
-        let hint = if field.kind == FieldKind::Day { "2026-05-03" } else { field.note.as_str() };
+        let hint = if field.kind == FieldKind::Day { "2026-05-03" } else { note.as_str() };
         let edit = TextEdit::singleline(text).desired_width(width).hint_text(hint);
         let response = ui.add(edit).labelled_by(label.id);
-        if !field.note.is_empty() {
-            response.on_hover_text(field.note.as_str());
+        if !note.is_empty() {
+            response.on_hover_text(&note);
         }
         if let FieldKind::OneOf(names) = &field.kind {
             choose(ui, &field.name, names, text);
         }
         if !field.unit.is_empty() {
-            ui.label(field.unit);
+            ui.label(term(field.unit));
         }
     });
     ui.end_row();
@@ -121,6 +123,6 @@ fn choose(ui: &mut Ui, of: &str, names: &[String], text: &mut String) {
             }
         });
     });
-    let hint = format!("Choose {of}");
+    let hint = tr!("Choose {}", term(of));
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, &hint));
 }

@@ -62,7 +62,7 @@ impl Window {
         banner::tell(
             &mut world.resource_mut::<Banners>(),
             &mut log,
-            "The scene had to be closed",
+            &tr!("The scene had to be closed"),
             fault,
         );
         *world.resource_mut::<Log>() = log;

@@ -16,7 +16,8 @@ use egui_tiles::{
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    Place,
+    Language, Place,
+    lang::{self, term},
     place::{Panel, Panels},
 };
 
@@ -31,6 +32,10 @@ const EXPERT: [&str; 8] =
     ["Render", "Inspector", "Meters", "Directions", "Convergence", "Steering", "Jobs", "Log"];
 /// Width that a member's sheet wants, points, and its bounds as shares of the window.
 const SHEET: (f32, f32, f32) = (322.0, 0.25, 0.36);
+
+/// The language of the window where nobody has chosen one: the system's, as far as the app knows it.
+#[derive(Resource, Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct SystemLanguage(pub Language);
 
 /// Two ways to arrange the window.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -79,6 +84,9 @@ struct Kept {
     chosen: Workspace,
     #[serde(default)]
     theme: Theme,
+    /// None: as the system has it.
+    #[serde(default)]
+    language: Option<Language>,
     inspector: Option<KeptLayout>,
     expert: Option<KeptLayout>,
 }
@@ -226,6 +234,8 @@ pub(crate) struct Desk {
     /// Panels that are to be brought to the front in the next.
     wanted: Vec<String>,
     theme: egui::ThemePreference,
+    /// None: as the system has it.
+    language: Option<Language>,
     /// Whether the theme has been put on.
     is_dressed: bool,
     is_changed: bool,
@@ -240,12 +250,12 @@ impl Desk {
             .and_then(|f| std::fs::read_to_string(f).ok());
         let kept: Option<Kept> = text.and_then(|t| serde_json::from_str(&t).ok());
         let kept = kept.filter(|k| k.schema == SCHEMA);
-        let (chosen, theme, laid) = kept.map_or_else(Default::default, |k| {
+        let (chosen, theme, language, laid) = kept.map_or_else(Default::default, |k| {
             let of = |kept: Option<KeptLayout>, workspace| Laid::of(kept?, workspace);
             let expert = of(k.expert, Workspace::Expert);
-            (k.chosen, k.theme.into(), [of(k.inspector, Workspace::Inspector), expert])
+            (k.chosen, k.theme.into(), k.language, [of(k.inspector, Workspace::Inspector), expert])
         });
-        Self { chosen, shown: chosen, theme, laid, file, ..Self::default() }
+        Self { chosen, shown: chosen, theme, language, laid, file, ..Self::default() }
     }
 
     /// Not being able to write it is no reason to trouble anybody.
@@ -260,7 +270,8 @@ impl Desk {
         let [inspector, expert] = &self.laid;
         let [inspector, expert] = [inspector, expert].map(|l| l.as_ref().map(Laid::kept));
         let (schema, chosen, theme) = (SCHEMA.into(), self.chosen, self.theme.into());
-        let kept = Kept { schema, chosen, theme, inspector, expert };
+        let language = self.language;
+        let kept = Kept { schema, chosen, theme, language, inspector, expert };
         std::fs::create_dir_all(file.parent().unwrap_or(Path::new(".")))?;
         let text = serde_json::to_string_pretty(&kept)?;
         intrados_stage::file::put(file, |out| out.write_all(text.as_bytes()))
@@ -287,6 +298,16 @@ impl Desk {
 
     pub(crate) fn theme(&self) -> egui::ThemePreference {
         self.theme
+    }
+
+    /// One language, from now on.
+    pub(crate) fn speak(&mut self, language: Language) {
+        (self.language, self.is_changed) = (Some(language), true);
+    }
+
+    /// The language that the user has chosen; none: as the system has it.
+    pub(crate) fn language(&self) -> Option<Language> {
+        self.language
     }
 
     /// The theme that is to be put on now, if one is.
@@ -467,6 +488,12 @@ fn settled(laid: Option<Laid>, workspace: Workspace, panels: &[Panel], width: f3
     laid
 }
 
+/// Speaks the language that was chosen, else the system's.
+pub(crate) fn speak(world: &World) {
+    let system = world.resource::<SystemLanguage>().0;
+    lang::speak(world.resource::<Desk>().language().unwrap_or(system));
+}
+
 /// Puts the theme on, once it is another one; small print is to be read without a lens.
 pub(crate) fn dress(ui: &Ui, world: &mut World) {
     let Some(theme) = world.resource_mut::<Desk>().bypass_change_detection().undressed() else {
@@ -493,7 +520,7 @@ struct Tiling<'a> {
 
 impl Behavior<String> for Tiling<'_> {
     fn tab_title_for_pane(&mut self, name: &String) -> WidgetText {
-        name.as_str().into()
+        term(name).into()
     }
 
     fn pane_ui(&mut self, ui: &mut Ui, _: TileId, name: &mut String) -> UiResponse {
@@ -551,7 +578,7 @@ pub(crate) fn show(ui: &mut Ui, world: &mut World, run: Run<'_>) {
         Tiling { world, panels: &panels, run, drawn: BTreeMap::new(), is_edited: false };
     if laid.tree.root().is_none() {
         ui.centered_and_justified(|ui| {
-            ui.weak("All panels are closed. View ▸ Panels opens them again.")
+            ui.weak(tr!("All panels are closed. View ▸ Panels opens them again."))
         });
     }
     laid.tree.ui(&mut tiling, ui);
@@ -626,6 +653,23 @@ mod tests {
         panels.retain(|p| p.name != "Member");
         let laid = settled(Some(laid), Workspace::Inspector, &panels, 1280.0);
         assert_eq!(names(&laid), ["Dose", "Structure"].map(String::from).into());
+    }
+
+    #[test]
+    fn a_language_that_was_chosen_is_kept_and_a_file_without_one_is_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("layout.json");
+        let mut desk = Desk::read(Some(file.clone()));
+        assert_eq!(desk.language(), None);
+        desk.speak(Language::German);
+        desk.choose(Workspace::Expert);
+        desk.write();
+        let again = Desk::read(Some(file.clone()));
+        assert_eq!((again.language(), again.shown()), (Some(Language::German), Workspace::Expert));
+        let text = std::fs::read_to_string(&file).unwrap();
+        std::fs::write(&file, text.replace("  \"language\": \"german\",\n", "")).unwrap();
+        let again = Desk::read(Some(file));
+        assert_eq!((again.language(), again.shown()), (None, Workspace::Expert));
     }
 
     #[test]

@@ -1,15 +1,17 @@
 //! From what was filled in to what is attached.
 
+use intrados_scene::structure::Date;
+
 use super::*;
 
 impl Form {
     /// What is attached, or what has to be filled in first.
     pub(super) fn attachment(&self) -> Result<Attachment, String> {
         let text = |text: &str| Some(text.trim().to_owned()).filter(|t| !t.is_empty());
-        let from = number("along", &self.from)?;
-        let to = number("along", &self.to)?;
+        let from = number(&tr!("along|place"), &self.from)?;
+        let to = number(&tr!("along|place"), &self.to)?;
         let date = text(&self.date)
-            .map(|d| d.parse().map_err(|why| format!("date: {why}")))
+            .map(|d| d.parse::<Date>().map_err(|why| tr!("date: {}", why)))
             .transpose()?;
         let what = self.what()?;
         let is_finding = matches!(what, What::Finding(_));
@@ -21,7 +23,7 @@ impl Form {
             along: from.map(|from| [from, to.filter(|_| !is_slices).unwrap_or(from)]),
             face: self.face,
             angle_deg: None,
-            height_m: number("height", &self.height_m)?.filter(|_| is_finding),
+            height_m: number(&tr!("height"), &self.height_m)?.filter(|_| is_finding),
             instrument: text(&self.instrument).filter(|_| !is_slices),
             picture: text(&self.picture).filter(|_| is_finding).map(PathBuf::from),
             what,
@@ -30,11 +32,11 @@ impl Form {
 
     fn what(&self) -> Result<What, String> {
         let files = || match &self.files[..] {
-            [] => Err("Add a file first.".to_owned()),
+            [] => Err(tr!("Add a file first.")),
             files => Ok(files.to_vec()),
         };
         match self.sort {
-            None => Err("Choose what is attached.".into()),
+            None => Err(tr!("Choose what is attached.")),
             Some(Sort::Finding) => self.finding().map(What::Finding),
             Some(Sort::Table) => match &files()?[..] {
                 [file] => Ok(What::Table {
@@ -44,11 +46,11 @@ impl Form {
                     test: Some(self.test.trim().to_owned()).filter(|t| !t.is_empty()),
                     electrode: Electrode::default(),
                 }),
-                _ => Err("A table is attached alone: one after another.".into()),
+                _ => Err(tr!("A table is attached alone: one after another.")),
             },
             Some(Sort::Slices) => Ok(What::Slices {
                 files: files()?,
-                pixel_mm: number("pixel", &self.pixel_mm)?,
+                pixel_mm: number(&tr!("pixel"), &self.pixel_mm)?,
                 cut: self.cut()?,
             }),
             Some(Sort::Stack) => {
@@ -59,8 +61,8 @@ impl Form {
     }
 
     fn cut(&self) -> Result<Cut, String> {
-        let depth: Option<f32> = number("depth", &self.depth_mm)?;
-        let diameter_mm = number("diameter", &self.diameter_mm)?;
+        let depth: Option<f32> = number(&tr!("depth|of damage"), &self.depth_mm)?;
+        let diameter_mm = number(&tr!("diameter"), &self.diameter_mm)?;
         Ok(Cut { depth_m: depth.map(|mm| 1e-3 * mm), diameter_mm, axis: None })
     }
 
@@ -72,26 +74,26 @@ impl Form {
             self.voxel_mm.split(',').map(|edge| edge.trim().parse().ok()).collect();
         match edges.as_deref() {
             Some([x, y, z]) => Ok(Some([*x, *y, *z])),
-            _ => Err("voxel: three numbers, such as 0.1, 0.1, 0.2".into()),
+            _ => Err(tr!("voxel: three numbers, such as 0.1, 0.1, 0.2")),
         }
     }
 
     fn finding(&self) -> Result<Finding, String> {
         let (name, measured) = FINDINGS.get(self.finding).copied().unwrap_or_default();
-        let value: Option<f64> = number(measured, &self.value)?;
-        let needed = || value.ok_or_else(|| format!("Fill in its {measured}."));
-        let error = number("standard error", &self.error)?;
+        let value: Option<f64> = number(&term(measured), &self.value)?;
+        let needed = || value.ok_or_else(|| tr!("Fill in its {}.", term(measured)));
+        let error = number(&tr!("standard error"), &self.error)?;
         let area_m2 = needed;
         Ok(match name {
             "crack" => Finding::Crack {
                 width_mm: needed()?,
                 std_error_mm: error,
                 course: COURSES.get(self.course).map_or(Course::Map, |c| c.1),
-                length_m: number("length", &self.length_m)?,
+                length_m: number(&tr!("length"), &self.length_m)?,
             },
             "spall" => Finding::Spall {
                 area_m2: area_m2()?,
-                depth_mm: number("depth", &self.depth_mm)?,
+                depth_mm: number(&tr!("depth|of damage"), &self.depth_mm)?,
                 bars_bare: false,
             },
             "rust stain" => Finding::Rust { area_m2: area_m2()? },
@@ -110,7 +112,7 @@ fn number<T: std::str::FromStr>(name: &str, text: &str) -> Result<Option<T>, Str
     if text.is_empty() {
         return Ok(None);
     }
-    text.parse().map(Some).map_err(|_| format!("{name}: “{text}” is no number"))
+    text.parse().map(Some).map_err(|_| tr!("{}: “{}” is no number", name, text))
 }
 
 #[cfg(test)]

@@ -15,7 +15,10 @@ use intrados_scene::{
 };
 use serde::{Deserialize, Serialize};
 
-use crate::{Action, Actions, Selection, dialog};
+use crate::{
+    Action, Actions, Selection, dialog,
+    lang::{fixed, term},
+};
 
 /// What is being attached.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -120,7 +123,7 @@ impl Form {
 
     /// Says where on the member it is, as somebody has shown it there.
     pub(crate) fn put_at(&mut self, along: f32, face: Option<Face>) {
-        self.from = format!("{along:.3}");
+        self.from = fixed(along, 3);
         self.to.clear();
         self.face = face.or(self.face);
     }
@@ -160,14 +163,14 @@ pub(crate) fn form(
     if let Some(member) = selection.0.and_then(|i| scene.0.members.get(i)) {
         form.member.clone_from(&member.id);
     }
-    ui.strong(format!("to {}", scene.0.name_of(&form.member)));
-    ui.weak("A click on the member in the picture says where on it.");
+    ui.strong(tr!("to {}", scene.0.name_of(&form.member)));
+    ui.weak(tr!("A click on the member in the picture says where on it."));
     ui.horizontal_wrapped(|ui| {
         for (sort, name) in [
-            (Sort::Finding, "A finding"),
-            (Sort::Slices, "CT slices"),
-            (Sort::Stack, "A CT volume"),
-            (Sort::Table, "A table"),
+            (Sort::Finding, tr!("A finding")),
+            (Sort::Slices, tr!("CT slices")),
+            (Sort::Stack, tr!("A CT volume")),
+            (Sort::Table, tr!("A table")),
         ] {
             ui.selectable_value(&mut form.sort, Some(sort), name);
         }
@@ -202,27 +205,31 @@ fn send(ui: &mut Ui, form: &mut Form, scene: &Scene, actions: &mut Actions) {
     let is_model = scene.path.extension().is_some_and(|e| !e.eq_ignore_ascii_case("ron"));
     if is_model {
         ui.horizontal_wrapped(|ui| {
-            ui.label("This is a model alone. Its project, in a folder beside it, holds evidence.");
-            if ui.button("Make its project").clicked() {
+            ui.label(tr!(
+                "This is a model alone. Its project, in a folder beside it, holds evidence."
+            ));
+            if ui.button(tr!("Make its project")).clicked() {
                 actions.ask(Action::MakeProject);
             }
         });
     }
     ui.horizontal_wrapped(|ui| {
         let may = filled.is_ok() && scene.path.exists() && !is_model;
-        if ui.add_enabled(may, egui::Button::new("Attach")).clicked()
+        if ui.add_enabled(may, egui::Button::new(tr!("Attach"))).clicked()
             && let Ok(what) = &filled
         {
             actions.ask(Action::Attach(Box::new(what.clone())));
             form.is_open = false;
         }
-        if ui.button("Cancel").clicked() {
+        if ui.button(tr!("Cancel")).clicked() {
             form.is_open = false;
         }
         if let Err(why) = &filled {
             ui.weak(why);
         } else if !scene.path.exists() {
-            ui.weak("This scene is part of the program: `intrados new` makes one that is yours.");
+            ui.weak(tr!(
+                "This scene is part of the program: `intrados new` makes one that is yours."
+            ));
         }
     });
 }
@@ -231,29 +238,29 @@ fn files(ui: &mut Ui, form: &mut Form, actions: &mut Actions) {
     for (n, file) in form.files.iter().enumerate().take(4) {
         ui.label(file.display().to_string());
         if n == 3 && form.files.len() > 4 {
-            ui.weak(format!("and {} more", form.files.len() - 4));
+            ui.weak(tr!("and {} more", form.files.len() - 4));
         }
     }
     ui.horizontal(|ui| {
-        let label = ui.label("File or folder");
+        let label = ui.label(tr!("File or folder"));
         let field = TextEdit::singleline(&mut form.path).desired_width(220.0);
         ui.add(field).labelled_by(label.id);
         let path = PathBuf::from(form.path.trim());
         let can = !form.path.trim().is_empty();
-        if ui.add_enabled(can, egui::Button::new("Add")).clicked() {
+        if ui.add_enabled(can, egui::Button::new(tr!("Add"))).clicked() {
             form.files.extend(evidence(&path).unwrap_or_else(|| vec![path]));
             form.path.clear();
         }
-        if ui.button("Browse…").clicked() {
+        if ui.button(tr!("Browse…")).clicked() {
             actions.ask(Action::ChooseEvidence);
         }
-        if !form.files.is_empty() && ui.button("Clear").clicked() {
+        if !form.files.is_empty() && ui.button(tr!("Clear")).clicked() {
             form.files.clear();
         }
     });
     if let [file] = &form.files[..]
         && dialog::is_photograph(file)
-        && ui.link("It is a photograph: place it first").clicked()
+        && ui.link(tr!("It is a photograph: place it first")).clicked()
     {
         actions.ask(Action::Photograph(file.clone()));
         form.is_open = false;
@@ -267,14 +274,14 @@ fn field(ui: &mut Ui, name: &str, text: &mut String, hint: &str) {
     ui.end_row();
 }
 
-/// One of several.
+/// One of several, of English names.
 fn choice(ui: &mut Ui, name: &str, chosen: &mut usize, names: &[&str]) {
     let label = ui.label(name);
     ComboBox::from_id_salt(name)
-        .selected_text(names.get(*chosen).copied().unwrap_or_default())
+        .selected_text(term(names.get(*chosen).copied().unwrap_or_default()))
         .show_ui(ui, |ui| {
             for (n, name) in names.iter().enumerate() {
-                ui.selectable_value(chosen, n, *name);
+                ui.selectable_value(chosen, n, term(name));
             }
         })
         .response
@@ -283,67 +290,69 @@ fn choice(ui: &mut Ui, name: &str, chosen: &mut usize, names: &[&str]) {
 }
 
 fn finding(ui: &mut Ui, form: &mut Form) {
-    choice(ui, "What", &mut form.finding, &FINDINGS.map(|(name, _)| name));
+    choice(ui, &tr!("What"), &mut form.finding, &FINDINGS.map(|(name, _)| name));
     let measured = FINDINGS.get(form.finding).map_or("", |f| f.1);
     if !measured.is_empty() {
-        field(ui, measured, &mut form.value, "");
+        field(ui, &term(measured), &mut form.value, "");
     }
     if measured.ends_with("mm") {
-        field(ui, "standard error, mm", &mut form.error, "usual of the instrument");
+        let hint = tr!("usual of the instrument");
+        field(ui, &tr!("standard error, mm"), &mut form.error, &hint);
     }
     if form.finding == 0 {
-        choice(ui, "It runs", &mut form.course, &COURSES.map(|(name, _)| name));
-        field(ui, "length, m", &mut form.length_m, "unknown");
+        choice(ui, &tr!("It runs"), &mut form.course, &COURSES.map(|(name, _)| name));
+        field(ui, &tr!("length, m"), &mut form.length_m, &tr!("unknown"));
     }
     if form.finding == 1 {
-        field(ui, "depth, mm", &mut form.depth_mm, "unknown");
+        field(ui, &tr!("depth, mm"), &mut form.depth_mm, &tr!("unknown"));
     }
-    field(ui, "Photograph of it", &mut form.picture, "path of a JPEG or PNG");
+    field(ui, &tr!("Photograph of it"), &mut form.picture, &tr!("path of a JPEG or PNG"));
 }
 
 fn table(ui: &mut Ui, form: &mut Form) {
-    choice(ui, "Its values are", &mut form.kind, &KINDS.map(|(name, _)| name));
-    field(ui, "Unit", &mut form.unit, "as the table says");
-    field(ui, "Load test", &mut form.test, "of gauges");
+    choice(ui, &tr!("Its values are"), &mut form.kind, &KINDS.map(|(name, _)| name));
+    field(ui, &tr!("Unit"), &mut form.unit, &tr!("as the table says"));
+    field(ui, &tr!("Load test"), &mut form.test, &tr!("of gauges"));
 }
 
 fn cut(ui: &mut Ui, form: &mut Form) {
     if form.sort == Some(Sort::Slices) {
-        field(ui, "pixel, mm", &mut form.pixel_mm, "as the files say");
+        field(ui, &tr!("pixel, mm"), &mut form.pixel_mm, &tr!("as the files say"));
     } else {
-        field(ui, "voxel, mm", &mut form.voxel_mm, "x, y, z, or as the files say");
+        let hint = tr!("x, y, z, or as the files say");
+        field(ui, &tr!("voxel, mm"), &mut form.voxel_mm, &hint);
     }
-    field(ui, "core's diameter, mm", &mut form.diameter_mm, "sawn");
-    field(ui, "depth below the face, mm", &mut form.depth_mm, "unknown");
+    field(ui, &tr!("core's diameter, mm"), &mut form.diameter_mm, &tr!("sawn"));
+    field(ui, &tr!("depth below the face, mm"), &mut form.depth_mm, &tr!("unknown"));
 }
 
 fn place(ui: &mut Ui, form: &mut Form) {
     let (from, to) = match form.sort {
-        Some(Sort::Slices | Sort::Stack) => ("along, 0 to 1", None),
-        _ => ("along from, 0 to 1", Some("along to")),
+        Some(Sort::Slices | Sort::Stack) => (tr!("along, 0 to 1"), None),
+        _ => (tr!("along from, 0 to 1"), Some(tr!("along to"))),
     };
-    field(ui, from, &mut form.from, "from the start of its axis");
+    field(ui, &from, &mut form.from, &tr!("from the start of its axis"));
     if let Some(to) = to {
-        field(ui, to, &mut form.to, "the same place");
+        field(ui, &to, &mut form.to, &tr!("the same place"));
     }
-    let label = ui.label("Face");
+    let label = ui.label(tr!("Face"));
     ComboBox::from_id_salt("face")
-        .selected_text(form.face.map_or("unknown", Face::name))
+        .selected_text(form.face.map_or_else(|| tr!("unknown"), |face| term(face.name())))
         .show_ui(ui, |ui| {
-            ui.selectable_value(&mut form.face, None, "unknown");
+            ui.selectable_value(&mut form.face, None, tr!("unknown"));
             for face in FACES {
-                ui.selectable_value(&mut form.face, Some(face), face.name());
+                ui.selectable_value(&mut form.face, Some(face), term(face.name()));
             }
         })
         .response
         .labelled_by(label.id);
     ui.end_row();
-    field(ui, "Date", &mut form.date, "2026-05-03");
+    field(ui, &tr!("Date"), &mut form.date, "2026-05-03");
     if !matches!(form.sort, Some(Sort::Slices | Sort::Stack)) {
-        field(ui, "Instrument", &mut form.instrument, "");
+        field(ui, &tr!("Instrument"), &mut form.instrument, "");
     }
     if form.sort == Some(Sort::Finding) {
-        field(ui, "height, m", &mut form.height_m, "above its lowest point");
+        field(ui, &tr!("height, m"), &mut form.height_m, &tr!("above its lowest point"));
     }
-    field(ui, "Name", &mut form.name, "one is made");
+    field(ui, &tr!("Name"), &mut form.name, &tr!("one is made"));
 }

@@ -23,8 +23,15 @@ pub(super) enum Overlay {
 }
 
 impl Overlay {
-    pub(super) const ALL: [(Self, &'static str); 3] =
-        [(Self::None, "No labels"), (Self::Outline, "Outlines"), (Self::Filled, "Filled labels")];
+    pub(super) const ALL: [Self; 3] = [Self::None, Self::Outline, Self::Filled];
+
+    pub(super) fn name(self) -> String {
+        match self {
+            Self::None => tr!("No labels"),
+            Self::Outline => tr!("Outlines"),
+            Self::Filled => tr!("Filled labels"),
+        }
+    }
 }
 
 fn step(read: &Read) -> usize {

@@ -20,7 +20,7 @@ use intrados_xray::plugin::{Scan, Scans};
 use plots::Order;
 use source::{Read, Source};
 
-use crate::{Actions, Selection, members, zoom::Zoom};
+use crate::{Actions, Selection, lang::drag, members, zoom::Zoom};
 
 /// Width of what stands beside the slice, points.
 const ASIDE: f32 = 290.0;
@@ -116,17 +116,13 @@ pub(crate) fn ct(
     let Some(scene) = scene else { return };
     let scene = &scene.0;
     let Some((member, of)) = selection.0.and_then(|i| Some((i, scene.members.get(i)?))) else {
-        return choose(ui, scene, "Select a member to see its slices:", &mut actions);
+        return choose(ui, scene, &tr!("Select a member to see its slices:"), &mut actions);
     };
     let scannable = scans.is_some().then(|| scannable(scene, &of.id)).flatten();
     let told = source::told(scene, member);
     if told.is_empty() && scannable.is_none() {
-        return choose(
-            ui,
-            scene,
-            &format!("{} has no CT slices and no scanner sees it.", of.name),
-            &mut actions,
-        );
+        let why = tr!("{} has no CT slices and no scanner sees it.", of.name);
+        return choose(ui, scene, &why, &mut actions);
     }
     let origin = match ct.origin {
         Some(Origin::Scanned) if scannable.is_some() => Origin::Scanned,
@@ -187,29 +183,24 @@ fn scannable<'a>(scene: &'a Scene, id: &str) -> Option<&'a str> {
 /// Which members have slices or can be scanned.
 fn choose(ui: &mut Ui, scene: &Scene, why: &str, actions: &mut Actions) {
     let has = |m: &Member| !m.slices.is_empty() || scannable(scene, &m.id).is_some();
-    members::choose(
-        ui,
-        scene,
-        has,
-        why,
-        "No member of this scene has CT slices, and there is no scanner.",
-        actions,
-    );
+    let none = tr!("No member of this scene has CT slices, and there is no scanner.");
+    members::choose(ui, scene, has, why, &none, actions);
 }
 
 fn origins(ui: &mut Ui, ct: &mut Ct, origin: Origin, told: bool, scannable: bool) {
     for (which, name, can, what) in [
         (
             Origin::Told,
-            "Its slices",
+            tr!("Its slices"),
             told,
-            "Slices that the scene names, or draws until there are any",
+            tr!("Slices that the scene names, or draws until there are any"),
         ),
         (
             Origin::Scanned,
-            "Simulated scan",
+            tr!("Simulated scan"),
             scannable,
-            "What the scene's scanner would see of this member: photons, scatter, noise, reconstruction",
+            tr!("What the scene's scanner would see of this member: photons, scatter, noise, \
+                 reconstruction"),
         ),
     ] {
         let button = ui
@@ -269,7 +260,7 @@ fn collect(ui: &Ui, ct: &mut Ct) {
                 Ok(Shown { read, grey, labels })
             }
             Ok(Err(reason)) => Err(reason),
-            Err(_) => Err("the reader broke off".into()),
+            Err(_) => Err(tr!("the reader broke off")),
         });
     }
     let profile = &mut ct.profile;
@@ -289,19 +280,22 @@ fn tools(ui: &mut Ui, ct: &mut Ct, sources: &[(String, Source)], has_sinogram: b
     let count = sources.len();
     ui.horizontal_wrapped(|ui| {
         if has_sinogram {
-            ui.selectable_value(&mut ct.sinogram, false, "Slices");
-            ui.selectable_value(&mut ct.sinogram, true, "Sinogram");
+            ui.selectable_value(&mut ct.sinogram, false, tr!("Slices"));
+            ui.selectable_value(&mut ct.sinogram, true, tr!("Sinogram"));
             ui.separator();
         }
         ui.label(&sources[ct.index].0);
-        let label = ui.label("Slice");
+        let label = ui.label(tr!("Slice"));
         let mut number = ct.index + 1;
         ui.add(Slider::new(&mut number, 1..=count)).labelled_by(label.id);
         ct.index = number.clamp(1, count) - 1;
         ui.separator();
         let mut method = ct.method();
-        let label = ui.label("Found by");
-        let name = |m: Method| if m == Method::Network { "network" } else { "local threshold" };
+        let label = ui.label(tr!("Found by"));
+        let name = |m: Method| match m {
+            Method::Network => tr!("network"),
+            _ => tr!("local threshold"),
+        };
         let combo = ComboBox::from_id_salt("ct method").selected_text(name(method)).width(110.0);
         let response = combo.show_ui(ui, |ui| {
             for m in [Method::Network, Method::Classical] {
@@ -310,10 +304,10 @@ fn tools(ui: &mut Ui, ct: &mut Ct, sources: &[(String, Source)], has_sinogram: b
         });
         response.response.labelled_by(label.id);
         ct.method = Some(method);
-        let now = Overlay::ALL.iter().find(|o| o.0 == ct.overlay).map_or("", |o| o.1);
-        ComboBox::from_id_salt("ct overlay").selected_text(now).width(100.0).show_ui(ui, |ui| {
-            for (overlay, name) in Overlay::ALL {
-                ui.selectable_value(&mut ct.overlay, overlay, name);
+        let combo = ComboBox::from_id_salt("ct overlay").selected_text(ct.overlay.name());
+        combo.width(100.0).show_ui(ui, |ui| {
+            for overlay in Overlay::ALL {
+                ui.selectable_value(&mut ct.overlay, overlay, overlay.name());
             }
         });
         ui.separator();
@@ -330,16 +324,16 @@ fn windowing(ui: &mut Ui, ct: &mut Ct) {
     let mut changed = false;
     for (name, value, least, what) in [
         (
-            "Window",
+            tr!("Window|of grey"),
             &mut width,
             0.01 * shown.read.suitable()[1],
-            "Grey from black to white; drag the slice with the right button, left and right",
+            tr!("Grey from black to white; drag the slice with the right button, left and right"),
         ),
         (
-            "Level",
+            tr!("Level|of grey"),
             &mut level,
             f32::MIN,
-            "Grey in the middle; drag the slice with the right button, up and down",
+            tr!("Grey in the middle; drag the slice with the right button, up and down"),
         ),
     ] {
         // Name and value go to the next line together.
@@ -348,9 +342,8 @@ fn windowing(ui: &mut Ui, ct: &mut Ct) {
         }
         ui.horizontal(|ui| {
             let label = ui.label(name);
-            let drag =
-                egui::DragValue::new(value).speed(speed).range(least..=f32::MAX).max_decimals(3);
-            changed |= ui.add(drag).labelled_by(label.id).on_hover_text(what).changed();
+            let value = drag(value).speed(speed).range(least..=f32::MAX).max_decimals(3);
+            changed |= ui.add(value).labelled_by(label.id).on_hover_text(what).changed();
         });
     }
     if changed {
@@ -358,8 +351,8 @@ fn windowing(ui: &mut Ui, ct: &mut Ct) {
     }
     if ct.window.is_some()
         && ui
-            .small_button("auto")
-            .on_hover_text("Black is air, concrete a light grey, metal white")
+            .small_button(tr!("auto"))
+            .on_hover_text(tr!("Black is air, concrete a light grey, metal white"))
             .clicked()
     {
         ct.window = None;
@@ -400,11 +393,11 @@ fn aside(
     ui.horizontal(|ui| {
         let unread = profile.along.iter().filter(|r| r.is_none()).count();
         if let Some(task) = &profile.task {
-            if ui.small_button("⏹ Stop reading").clicked() {
+            if ui.small_button(tr!("⏹ Stop reading")).clicked() {
                 task.job().cancel();
             }
             ui.add(egui::ProgressBar::new(task.job().done()).desired_width(120.0));
-        } else if unread > 0 && ui.button(format!("Read the other {unread} slices")).clicked() {
+        } else if unread > 0 && ui.button(tr!("Read the other {} slices", unread)).clicked() {
             let (told, scene, method, shelf) =
                 (Arc::clone(&profile.told), Arc::clone(scene), method, shelf.clone());
             let list: Vec<(usize, Source)> = (0..sources.len())
@@ -420,7 +413,7 @@ fn aside(
             }));
         }
         if let Some(first) = profile.failures.first() {
-            ui.label(format!("⚠ {} not read", profile.failures.len())).on_hover_text(first);
+            ui.label(tr!("⚠ {} not read", profile.failures.len())).on_hover_text(first);
         }
     });
     let follow = std::mem::take(follow);

@@ -5,6 +5,7 @@ use egui::{Color32, PointerButton, Rect, Response, Sense, TextureOptions, Ui, Ve
 use super::{Ct, Shown, draw, source::Read};
 use crate::{
     colours,
+    lang::{fixed, term},
     number::{percent, significant},
     zoom::Zoom,
 };
@@ -19,12 +20,12 @@ pub(super) fn show(ui: &mut Ui, ct: &mut Ct, rect: Rect, unit: &str) {
     let Some(Ok(shown)) = &mut ct.shown else {
         let middle = Rect::from_center_size(rect.center(), vec2(rect.width() - 20.0, 40.0));
         ui.scope_builder(egui::UiBuilder::new().max_rect(middle), |ui| match &ct.shown {
-            Some(Err(reason)) => drop(ui.label(format!("⚠ This slice cannot be shown: {reason}"))),
+            Some(Err(reason)) => drop(ui.label(tr!("⚠ This slice cannot be shown: {}", reason))),
             _ => drop(ui.vertical_centered(egui::Ui::spinner)),
         });
         return;
     };
-    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "CT slice"));
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, tr!("CT slice")));
     let size = vec2(shown.read.slice.grey.width as f32, shown.read.slice.grey.height as f32);
     hand(ui, &response, &mut ct.view, &mut ct.window, &shown.read, rect, size);
     let window = ct.window.unwrap_or_else(|| shown.read.suitable());
@@ -57,18 +58,18 @@ pub(super) fn show(ui: &mut Ui, ct: &mut Ct, rect: Rect, unit: &str) {
     let caption = match response.hover_pos().map(pixel).and_then(|at| under(&shown.read, at, unit))
     {
         Some(text) => text,
-        None if busy => "reading…".into(),
-        None => shown.read.caption.clone(),
+        None if busy => tr!("reading…"),
+        None => shown.read.caption(),
     };
     let (pores, cracks) = (shown.read.found.pores.len(), shown.read.found.cracks.len());
     ui.scope_builder(egui::UiBuilder::new().max_rect(strip), |ui| {
         ui.horizontal(|ui| {
-            for (count, name, colour) in
-                [(pores, "pores", draw::PORE), (cracks, "cracks", draw::CRACK)]
+            for (said, colour) in
+                [(tr!("{} pores", pores), draw::PORE), (tr!("{} cracks", cracks), draw::CRACK)]
             {
                 let (swatch, _) = ui.allocate_exact_size(vec2(14.0, 10.0), Sense::hover());
                 ui.painter().rect_filled(swatch.shrink2(vec2(0.0, 2.0)), 1.0, colour);
-                ui.label(format!("{count} {name}"));
+                ui.label(said);
             }
             ui.separator();
             ui.add(egui::Label::new(egui::RichText::new(caption).weak()).truncate());
@@ -120,17 +121,17 @@ fn under(read: &Read, at: Vec2, unit: &str) -> Option<String> {
     let i = inside.then(|| at.y as usize * grey.width + at.x as usize)?;
     let mm = at * read.slice.pixel_mm;
     let unit = if unit == "grey" { String::new() } else { format!(" {unit}") };
-    let mut text =
-        format!("{:.1}, {:.1} mm: {}{unit}", mm.x, mm.y, significant(f64::from(grey.data[i]), 3));
+    let value = significant(f64::from(grey.data[i]), 3) + &unit;
+    let mut text = tr!("{}, {} mm: {}", fixed(mm.x, 1), fixed(mm.y, 1), value);
     if read.found.body.data[i] {
-        text += &format!(", {} of the matrix", percent(f64::from(read.found.grey.data[i])));
+        text += &tr!(", {} of the matrix", percent(f64::from(read.found.grey.data[i])));
     }
     if read.found.crack_mask.data[i] {
-        text += ", crack";
+        text += &tr!(", crack");
     } else if let Some(pore) =
         read.found.pores.iter().find(|p| p.label == read.found.labels.data[i])
     {
-        text += &format!(
+        text += &tr!(
             ", pore of {} mm, {} mm deep",
             significant(pore.diameter_mm, 2),
             significant(pore.depth_mm, 2)
@@ -162,13 +163,7 @@ fn legend(ui: &Ui, rect: Rect, [low, high]: [f32; 2], unit: &str) {
         let at = pos2(bar.left() - 5.0, bar.bottom() - bar.height() * k as f32 / 2.0);
         label(&painter, ui, at, egui::Align2::RIGHT_CENTER, significant(f64::from(value), 3));
     }
-    label(
-        &painter,
-        ui,
-        pos2(bar.right(), bar.top() - 8.0),
-        egui::Align2::RIGHT_BOTTOM,
-        unit.to_owned(),
-    );
+    label(&painter, ui, pos2(bar.right(), bar.top() - 8.0), egui::Align2::RIGHT_BOTTOM, term(unit));
 }
 
 /// A round number of millimetres.

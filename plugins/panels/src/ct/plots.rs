@@ -9,15 +9,17 @@ use super::source::Read;
 use crate::{
     chart::{key, place, plot},
     colours,
+    lang::{fixed, term},
     number::{percent, significant},
 };
 
 /// Grey of the body's pixels, with the window over it.
 pub(super) fn histogram(ui: &mut Ui, read: &Read, window: [f32; 2], height: f32) {
     ui.horizontal(|ui| {
-        ui.strong("Histogram")
-            .on_hover_text("Share of the body's pixels by grey (root scale); the lines are what is shown black and white");
-        ui.weak("of the body's grey");
+        ui.strong(tr!("Histogram"))
+            .on_hover_text(tr!("Share of the body's pixels by grey (root scale); \
+             the lines are what is shown black and white"));
+        ui.weak(tr!("of the body's grey"));
     });
     let [low, high] = read.range.map(f64::from);
     let width = (high - low) / read.histogram.len().max(1) as f64;
@@ -33,11 +35,11 @@ pub(super) fn histogram(ui: &mut Ui, read: &Read, window: [f32; 2], height: f32)
         .y_axis_formatter(|mark, _| percent(mark.value * mark.value))
         .label_formatter(|hover| {
             let p = place(hover);
-            Some(format!("grey {}", significant(p.x, 3)))
+            Some(tr!("grey {}", significant(p.x, 3)))
         });
     chart.show(ui, |chart| {
-        chart.line(Line::new("share", steps).color(colours::PRIMAL).width(1.5).fill(0.0));
-        for (name, at) in ["black", "white"].into_iter().zip(window) {
+        chart.line(Line::new(tr!("share"), steps).color(colours::PRIMAL).width(1.5).fill(0.0));
+        for (name, at) in [tr!("black"), tr!("white")].into_iter().zip(window) {
             chart.vline(VLine::new(name, f64::from(at)).color(colours::SELECTED).width(1.5));
         }
     });
@@ -53,40 +55,41 @@ pub(super) fn profile(
     height: f32,
 ) -> Option<usize> {
     ui.horizontal(|ui| {
-        ui.strong("Porosity along the axis")
-            .on_hover_text("Of the slices that have been read, ± standard error of reading; a click goes to the slice");
+        ui.strong(tr!("Porosity along the axis"))
+            .on_hover_text(tr!("Of the slices that have been read, ± standard error of reading; \
+             a click goes to the slice"));
         if truth.is_some() {
-            key(ui, "planted here", colours::COMBINED, false);
+            key(ui, &tr!("planted here"), colours::COMBINED, false);
         }
     });
     let known =
         || along.iter().enumerate().filter_map(|(k, r)| Some((k as f64 + 1.0, r.as_ref()?)));
     let chart = plot("porosity")
         .height(height)
-        .x_axis_label("slice")
+        .x_axis_label(tr!("slice"))
         .include_x(0.5)
         .include_x(along.len() as f64 + 0.5)
         .include_y(0.0)
         .y_axis_formatter(|mark, _| format!("{} %", significant(100.0 * mark.value, 2)))
         .label_formatter(|hover| {
             let p = place(hover);
-            Some(format!("slice {:.0}: {}", p.x.round(), percent(p.y)))
+            Some(tr!("slice {}: {}", p.x.round(), percent(p.y)))
         });
     let shown = chart.show(ui, |chart| {
-        chart.vline(VLine::new("shown", now as f64 + 1.0).color(colours::SELECTED).width(1.0));
+        chart.vline(VLine::new(tr!("shown"), now as f64 + 1.0).color(colours::SELECTED).width(1.0));
         let dots: Vec<[f64; 2]> = known().map(|(x, r)| [x, r.value]).collect();
         chart.line(
-            Line::new("porosity", PlotPoints::new(dots.clone()))
+            Line::new(tr!("porosity"), PlotPoints::new(dots.clone()))
                 .color(colours::PRIMAL.gamma_multiply(0.5))
                 .width(1.0),
         );
         for (x, r) in known() {
             let bar: PlotPoints<'_> =
                 [-1.0, 1.0].map(|s| [x, r.value + s * r.std_error]).into_iter().collect();
-            chart.line(Line::new("error", bar).color(colours::PRIMAL).width(2.0));
+            chart.line(Line::new(tr!("error"), bar).color(colours::PRIMAL).width(2.0));
         }
         chart.points(
-            Points::new("porosity", PlotPoints::new(dots))
+            Points::new(tr!("porosity"), PlotPoints::new(dots))
                 .color(colours::PRIMAL)
                 .shape(MarkerShape::Circle)
                 .radius(3.0),
@@ -94,7 +97,7 @@ pub(super) fn profile(
         if let Some(truth) = truth {
             let cross = vec![[now as f64 + 1.0, truth]];
             chart.points(
-                Points::new("planted", cross)
+                Points::new(tr!("planted"), cross)
                     .color(colours::COMBINED)
                     .shape(MarkerShape::Cross)
                     .radius(5.0),
@@ -106,7 +109,7 @@ pub(super) fn profile(
     (!along.is_empty()).then(|| (at.x.round().max(1.0) as usize).min(along.len()) - 1)
 }
 
-/// Columns of the table: name, what it is, value, digits.
+/// Columns of the table: name and what it is, both a [`term`], and value.
 type Column = (&'static str, &'static str, fn(&Pore) -> f64);
 const COLUMNS: [Column; 6] = [
     ("size mm", "Diameter of the circle of the same area", |p| p.diameter_mm),
@@ -157,8 +160,8 @@ pub(super) fn table(
     follow: bool,
 ) -> Option<u32> {
     ui.horizontal(|ui| {
-        ui.strong("Pores");
-        ui.weak(format!("{}; a click shows where", pores.len()));
+        ui.strong(tr!("Pores"));
+        ui.weak(tr!("{}; a click shows where", pores.len()));
     });
     let row = ui.text_style_height(&egui::TextStyle::Small) + 5.0;
     let width = ui.available_width() - 10.0;
@@ -172,13 +175,14 @@ pub(super) fn table(
     };
     let (head, _) = ui.allocate_exact_size(vec2(width, row), Sense::hover());
     for (k, (name, what, _)) in COLUMNS[..columns].iter().enumerate() {
+        let name = term(name);
         let rect =
             egui::Rect::from_min_size(head.min + vec2(cell * k as f32, 0.0), vec2(cell, row));
         let response = ui
             .interact(rect, ui.scope_id().with(("order", k)), Sense::click())
-            .on_hover_text(*what);
+            .on_hover_text(term(what));
         response.widget_info(|| {
-            egui::WidgetInfo::labeled(egui::Role::Button, true, format!("sort by {name}"))
+            egui::WidgetInfo::labeled(egui::Role::Button, true, tr!("sort by {}", name))
         });
         if response.clicked() {
             *order = Order { column: k, falling: order.column != k || !order.falling };
@@ -206,7 +210,10 @@ pub(super) fn table(
             let pore = &pores[i];
             let (rect, response) = ui.allocate_exact_size(vec2(width, row), Sense::click());
             let is_picked = picked == Some(pore.label);
-            let name = || format!("pore {} at {:.1}, {:.1} mm", pore.label, pore.x_mm, pore.y_mm);
+            let name = || {
+                let [x, y] = [pore.x_mm, pore.y_mm].map(|mm| fixed(mm, 1));
+                tr!("pore {} at {}, {} mm", pore.label, x, y)
+            };
             response.widget_info(|| {
                 egui::WidgetInfo::selected(egui::Role::Button, true, is_picked, name())
             });

@@ -10,7 +10,10 @@ use intrados_xray::{
 };
 
 use super::draw;
-use crate::number::{percent, significant};
+use crate::{
+    lang::{drag, fixed},
+    number::{percent, significant},
+};
 
 /// What to ask for.
 pub(super) struct Wish {
@@ -64,57 +67,60 @@ pub(super) fn controls(
     ui.horizontal_wrapped(|ui| {
         let mut along = wish.along.unwrap_or_else(first);
         ui.add_enabled_ui(!running, |ui| {
-            number(
-                ui,
-                "At",
-                DragValue::new(&mut along).range(0.0..=1.0).speed(0.005).max_decimals(3),
-                "Place on the member's axis, 0 to 1",
-            );
-            number(ui, "views", DragValue::new(&mut wish.views).range(24..=1440), "Projections of the orbit");
-            number(ui, "pixels", DragValue::new(&mut wish.width).range(32..=1024), "Across the panel; the field of view stays");
-            number(ui, "slices", DragValue::new(&mut wish.slices).range(1..=32), "Slices round the place");
-            number(ui, "seed", DragValue::new(&mut wish.seed), "Of concrete and noise");
+            let place = drag(&mut along).range(0.0..=1.0).speed(0.005).max_decimals(3);
+            number(ui, tr!("At"), place, tr!("Place on the member's axis, 0 to 1"));
+            let views = drag(&mut wish.views).range(24..=1440);
+            number(ui, tr!("views"), views, tr!("Projections of the orbit"));
+            let width = drag(&mut wish.width).range(32..=1024);
+            let what = tr!("Across the panel; the field of view stays");
+            number(ui, tr!("pixels"), width, what);
+            let slices = drag(&mut wish.slices).range(1..=32);
+            number(ui, tr!("slices|of a scan"), slices, tr!("Slices round the place"));
+            number(ui, tr!("seed"), drag(&mut wish.seed), tr!("Of concrete and noise"));
         });
         wish.along = Some(along);
         if let Some(Work::Running(task)) = scan.map(|s| &s.work) {
-            if ui.button("⏹ Stop scan").clicked() {
+            if ui.button(tr!("⏹ Stop scan")).clicked() {
                 asks.stop.write(StopScan(member.to_owned()));
             }
             let job = task.job();
-            ui.add(ProgressBar::new(job.done()).desired_width(150.0).text(format!("{:.0} %", 100.0 * job.done())));
+            let done = format!("{} %", fixed(100.0 * job.done(), 0));
+            ui.add(ProgressBar::new(job.done()).desired_width(150.0).text(done));
             ui.weak(job.label());
             ui.ctx().request_repaint_after(std::time::Duration::from_millis(50));
             return;
         }
-        let name = if scan.is_some() { "⟲ Scan again" } else { "▶ Scan" };
-        if ui.button(name).on_hover_text("Photons from the scene's scanner through this member, as `intrados scan` computes them").clicked()
-        {
+        let name = if scan.is_some() { tr!("⟲ Scan again") } else { tr!("▶ Scan") };
+        let hint = tr!("Photons from the scene's scanner through this member, \
+             as `intrados scan` computes them");
+        if ui.button(name).on_hover_text(hint).clicked() {
+            let member = member.to_owned();
             let Wish { views, width, slices, seed, corrections, .. } = *wish;
-            asks.take.write(TakeScan { member: member.to_owned(), along, views, width, slices, seed, corrections });
+            asks.take.write(TakeScan { member, along, views, width, slices, seed, corrections });
         }
     });
     ui.horizontal_wrapped(|ui| {
-        ui.label("Corrections:");
+        ui.label(tr!("Corrections:"));
         let before = wish.corrections;
         let c = &mut wish.corrections;
         ui.add_enabled_ui(!running, |ui| {
             for (name, on, what) in [
                 (
-                    "scatter",
+                    tr!("scatter"),
                     &mut c.scatter,
-                    "Scattered photons, as walks of their own estimate them, are taken off",
+                    tr!("Scattered photons, as walks of their own estimate them, are taken off"),
                 ),
                 (
-                    "hardening",
+                    tr!("hardening"),
                     &mut c.hardening,
-                    "Line integrals are made straight: soft photons do not get far",
+                    tr!("Line integrals are made straight: soft photons do not get far"),
                 ),
                 (
-                    "rings",
+                    tr!("rings"),
                     &mut c.rings,
-                    "Gains that have drifted are found as stripes of the sinogram",
+                    tr!("Gains that have drifted are found as stripes of the sinogram"),
                 ),
-                ("metal", &mut c.metal, "The same for steel (with hardening)"),
+                (tr!("metal"), &mut c.metal, tr!("The same for steel (with hardening)")),
             ] {
                 ui.checkbox(on, name).on_hover_text(what);
             }
@@ -125,29 +131,29 @@ pub(super) fn controls(
         if let Some(done) = scan.and_then(Scan::done) {
             let scatter_map = &done.acquisition.scatter_map;
             ui.separator();
-            ui.weak(format!(
+            ui.weak(tr!(
                 "scatter over primary {} ± {}",
                 significant(scatter_map.to_primary, 3),
                 percent(scatter_map.rel_error)
             ));
             if done.restored.starved > 1e-4 {
-                ui.label(format!("⚠ {} of the rays starved", percent(done.restored.starved)))
-                    .on_hover_text("Behind them less was left than its own error");
+                ui.label(tr!("⚠ {} of the rays starved", percent(done.restored.starved)))
+                    .on_hover_text(tr!("Behind them less was left than its own error"));
             }
         }
         match scan.map(|s| &s.work) {
             Some(Work::Failed(why)) => {
-                drop(ui.colored_label(ui.visuals().error_fg_color, format!("⚠ Not scanned: {why}")))
+                drop(ui.colored_label(ui.visuals().error_fg_color, tr!("⚠ Not scanned: {}", why)))
             }
-            Some(Work::Cancelled) => drop(ui.label("⏹ Stopped")),
+            Some(Work::Cancelled) => drop(ui.label(tr!("⏹ Stopped"))),
             _ => {}
         }
     });
 }
 
-fn number(ui: &mut Ui, name: &str, drag: DragValue<'_>, what: &str) {
+fn number(ui: &mut Ui, name: String, value: DragValue<'_>, what: String) {
     let label = ui.label(name);
-    ui.add(drag).labelled_by(label.id).on_hover_text(what);
+    ui.add(value).labelled_by(label.id).on_hover_text(what);
 }
 
 /// There are no slices yet: the sinogram as it forms, or nothing.
@@ -160,18 +166,23 @@ pub(super) fn waiting(ui: &mut Ui, picture: &mut Picture, scan: Option<&Scan>, n
             ui.add_space(24.0);
             ui.vertical_centered(|ui| {
                 ui.spinner();
-                ui.label(
-                    "Concrete grows, and scatter is walked, before the first projection is taken…",
-                );
+                ui.label(tr!(
+                    "Concrete grows, and scatter is walked, before the first projection is taken…"
+                ));
             });
         }
         Some(_) => {}
         None => {
             ui.add_space(24.0);
             ui.vertical_centered(|ui| {
-                ui.heading("Not scanned yet");
-                ui.label(format!("Scan takes projections of {name} with the scene's scanner and reconstructs slices from them."));
-                ui.weak("Pores, grains, bars and planted damage are those of the scene. Some tens of seconds.");
+                ui.heading(tr!("Not scanned yet"));
+                ui.label(tr!(
+                    "Scan takes projections of {} with the scene's scanner and reconstructs \
+                     slices from them.",
+                    name
+                ));
+                ui.weak(tr!("Pores, grains, bars and planted damage are those of the scene. \
+                     Some tens of seconds."));
             });
         }
     }
@@ -197,11 +208,7 @@ pub(super) fn sinogram(ui: &mut Ui, picture: &mut Picture, scan: &Scan, area: Re
     let Some((_, texture)) = &picture.0 else { return };
     let response = ui.allocate_rect(area, egui::Sense::hover());
     response.widget_info(|| {
-        egui::WidgetInfo::labeled(
-            egui::Role::Image,
-            true,
-            format!("Sinogram of {}", scan.wish.member),
-        )
+        egui::WidgetInfo::labeled(egui::Role::Image, true, tr!("Sinogram of {}", scan.wish.member))
     });
     let painter = ui.painter().with_clip_rect(area);
     painter.rect_filled(area, 2.0, ui.visuals().extreme_bg_color);
@@ -228,14 +235,14 @@ pub(super) fn sinogram(ui: &mut Ui, picture: &mut Picture, scan: &Scan, area: Re
     let text = |at, align, text: String| painter.text(at, align, text, font.clone(), colour);
     let done = count / bins.max(1);
     let so_far = if running && done < views {
-        format!("view {done} of {views}")
+        tr!("view {} of {}", done, views)
     } else {
-        format!("{views} views")
+        tr!("{} views", views)
     };
     text(
         pos2(rect.left(), rect.top() - 6.0),
         egui::Align2::LEFT_BOTTOM,
-        format!("−ln(I/I₀) of the middle row: {bins} bins, {so_far}"),
+        tr!("−ln(I/I₀) of the middle row: {} bins, {}", bins, so_far),
     );
     text(pos2(rect.left() - 6.0, rect.top()), egui::Align2::RIGHT_TOP, "0°".into());
     let arc = scan
@@ -245,6 +252,6 @@ pub(super) fn sinogram(ui: &mut Ui, picture: &mut Picture, scan: &Scan, area: Re
     text(
         pos2(rect.left() - 6.0, rect.bottom()),
         egui::Align2::RIGHT_BOTTOM,
-        format!("{:.0}°", arc.to_degrees()),
+        format!("{}°", fixed(arc.to_degrees(), 0)),
     );
 }

@@ -10,7 +10,7 @@ use intrados_scene::Scene;
 use intrados_stage::{Estimate, Job, alone};
 use intrados_xray::plugin::Scanned;
 
-use crate::number::percent;
+use crate::{lang::fixed, number::percent};
 
 /// Steps of the histogram.
 const BINS: usize = 128;
@@ -35,7 +35,7 @@ pub(super) fn told(scene: &Scene, member: usize) -> Vec<(String, Source)> {
 /// The slices of a scan.
 pub(super) fn scanned(scan: &Scanned) -> Vec<(String, Source)> {
     (0..scan.restored.volume.grid.size[2])
-        .map(|z| ("scan".to_owned(), Source::Taken(scan.clone(), z)))
+        .map(|z| (tr!("scan"), Source::Taken(scan.clone(), z)))
         .collect()
 }
 
@@ -43,7 +43,6 @@ pub(super) fn scanned(scan: &Scanned) -> Vec<(String, Source)> {
 pub(super) struct Read {
     pub(super) slice: Slice,
     pub(super) found: Detection,
-    pub(super) caption: String,
     /// Grey that the histogram begins and ends at, and its shares of the body's pixels.
     pub(super) range: [f32; 2],
     pub(super) histogram: Vec<f64>,
@@ -148,17 +147,25 @@ impl Read {
             let at = (v - range[0]) / (range[1] - range[0]) * BINS as f32;
             histogram[(at.max(0.0) as usize).min(BINS - 1)] += 1.0 / body.len() as f64;
         }
-        let caption = format!(
-            "{}: {} × {} pixels of {:.3} mm, porosity {} ± {}{}",
+        Self { slice, found, range, histogram, matrix, truth }
+    }
+
+    /// Name, size and porosity.
+    pub(super) fn caption(&self) -> String {
+        let Self { slice, found, .. } = self;
+        let caption = tr!(
+            "{}: {} × {} pixels of {} mm, porosity {} ± {}",
             slice.name,
             slice.grey.width,
             slice.grey.height,
-            slice.pixel_mm,
+            fixed(slice.pixel_mm, 3),
             percent(found.porosity.value),
-            percent(found.porosity.std_error),
-            truth.map_or_else(String::new, |t| format!(" (planted {})", percent(t)))
+            percent(found.porosity.std_error)
         );
-        Self { slice, found, caption, range, histogram, matrix, truth }
+        match self.truth {
+            None => caption,
+            Some(truth) => tr!("{} (planted {})", caption, percent(truth)),
+        }
     }
 
     /// Black and white that suit concrete: nothing, and a little more than the concrete, so that

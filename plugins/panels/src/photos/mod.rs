@@ -10,13 +10,18 @@ use std::{path::PathBuf, sync::Arc};
 use bevy_ecs::prelude::*;
 use egui::{ComboBox, Rect, ScrollArea, TextureHandle, TextureOptions, Ui, pos2};
 use glam::DVec3;
-use intrados_photo::{Located, Pick};
+use intrados_photo::{ByEdges, Located, Pick};
 use intrados_scene::{Member, Scene, plugin::CurrentScene, structure::Photographed};
 use intrados_stage::{Jobs, Task};
 use model::Turn;
 use work::{Face, Opened, Picked, Placed};
 
-use crate::{Action, Actions, Selection, Viewpoint, members, zoom::Zoom};
+use crate::{
+    Action, Actions, Selection, Viewpoint,
+    lang::{fixed, term},
+    members,
+    zoom::Zoom,
+};
 
 /// Width of what stands beside the photograph, points.
 const ASIDE: f32 = 310.0;
@@ -152,7 +157,7 @@ impl Shot {
         let (photo, photograph, site) = (photo.clone(), Arc::clone(photograph), Arc::clone(site));
         let edges: Vec<[DVec3; 2]> = outline.edges.clone();
         let picks: Vec<Pick> = self.picks.iter().map(|p| p.pick).collect();
-        self.placing = Some(Task::spawn_unlisted(jobs, "placing a photograph", move |_| {
+        self.placing = Some(Task::spawn_unlisted(jobs, tr!("placing a photograph"), move |_| {
             work::place(&photo, &photograph, &site, &edges, &picks)
         }));
     }
@@ -163,7 +168,7 @@ impl Shot {
         let (photo, photograph, site) = (photo.clone(), Arc::clone(photograph), Arc::clone(site));
         let scene = Arc::clone(scene);
         (self.faces, self.failure) = (Vec::new(), None);
-        self.reading = Some(Task::spawn(jobs, "reading a photograph", move |job| {
+        self.reading = Some(Task::spawn(jobs, tr!("reading a photograph"), move |job| {
             work::read(&scene, &photo, &site, (&photograph, &located), job)
         }));
     }
@@ -177,7 +182,7 @@ impl Shot {
                     Ok(located)
                 }
                 Ok(Err(why)) => Err(why),
-                Err(_) => Err("placing it broke off".into()),
+                Err(_) => Err(tr!("placing it broke off")),
             });
         }
         match Task::take(&mut self.reading) {
@@ -190,7 +195,7 @@ impl Shot {
                 self.faces = faces.into_iter().map(load).collect();
             }
             Some(Ok(Err(why))) => self.failure = Some(why),
-            Some(Err(_)) => self.failure = Some("reading it broke off".into()),
+            Some(Err(_)) => self.failure = Some(tr!("reading it broke off")),
             None => {}
         }
     }
@@ -210,9 +215,9 @@ pub(crate) fn photos(
     let scene = &scene.0;
     go_to_added(photos, scene);
     let Some(member) = selection.0.and_then(|i| scene.members.get(i)) else {
-        let none = "This scene has no structural members.";
-        let why = "Select the member that a photograph is of:";
-        return members::choose(ui, scene, |_| true, why, none, &mut actions);
+        let none = tr!("This scene has no structural members.");
+        let why = tr!("Select the member that a photograph is of:");
+        return members::choose(ui, scene, |_| true, &why, &none, &mut actions);
     };
     choose(ui, photos, scene, member, &mut actions);
     ask(photos, scene, member, &mut jobs);
@@ -224,11 +229,14 @@ pub(crate) fn photos(
             return;
         }
         None => {
-            ui.label("Photographs of this member that evidence names stand here. Open another one, or drop it on the window.");
+            ui.label(tr!(
+                "Photographs of this member that evidence names stand here. Open another one, or \
+                 drop it on the window."
+            ));
             return;
         }
         Some(Err(why)) => {
-            ui.label(format!("⚠ {why}"));
+            ui.label(format!("⚠ {}", term(why)));
             return;
         }
         Some(Ok(shot)) => shot.place(&mut jobs),
@@ -263,14 +271,14 @@ fn choose(ui: &mut Ui, photos: &mut Photos, scene: &Scene, member: &Member, acti
         }
         let field = egui::TextEdit::singleline(&mut photos.path)
             .desired_width(180.0)
-            .hint_text("path of a photograph");
+            .hint_text(tr!("path of a photograph"));
         let entered = ui.add(field).lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter));
         let can = !photos.path.trim().is_empty();
-        let go = ui.add_enabled(can, egui::Button::new("Open photograph"));
+        let go = ui.add_enabled(can, egui::Button::new(tr!("Open photograph")));
         if can && (entered || go.clicked()) {
             photos.chosen = Some(PathBuf::from(photos.path.trim()));
         }
-        if ui.button("Browse…").on_hover_text("JPEG, PNG or TIFF").clicked() {
+        if ui.button(tr!("Browse…")).on_hover_text(tr!("JPEG, PNG or TIFF")).clicked() {
             actions.ask(Action::ChoosePhotograph);
         }
         faces(ui, photos);
@@ -286,7 +294,7 @@ fn faces(ui: &mut Ui, photos: &mut Photos) {
     }
     let name = |k: Option<usize>| {
         let face = k.and_then(|k| shot.faces.get(k));
-        face.map_or("Photograph", |(f, _)| f.name.as_str())
+        face.map_or_else(|| tr!("Photograph"), |(f, _)| term(&f.name))
     };
     ui.separator();
     let before = *face;
@@ -329,8 +337,8 @@ fn ask(photos: &mut Photos, scene: &Arc<Scene>, member: &Member, jobs: &mut Jobs
     }
     let photo = told.unwrap_or_else(|| work::own(key.2, &member.id));
     let scene = Arc::clone(scene);
-    photos.opening =
-        Some(Task::spawn(jobs, "opening a photograph", move |job| work::open(&scene, photo, job)));
+    let label = tr!("opening a photograph");
+    photos.opening = Some(Task::spawn(jobs, label, move |job| work::open(&scene, photo, job)));
 }
 
 /// Takes what has come.
@@ -360,7 +368,7 @@ fn collect(ui: &Ui, photos: &mut Photos) {
                 })
             }
             Ok(Err(why)) => Err(why),
-            Err(_) => Err("opening it broke off".into()),
+            Err(_) => Err(tr!("opening it broke off")),
         });
     }
     if let Some(Ok(shot)) = &mut photos.shot {
@@ -400,13 +408,15 @@ fn aside(
     ui.horizontal_wrapped(|ui| {
         let is_placed = shot.located().is_some();
         if let Some(task) = &shot.reading {
-            if ui.small_button("⏹ Stop reading").clicked() {
+            if ui.small_button(tr!("⏹ Stop reading")).clicked() {
                 task.job().cancel();
             }
             ui.add(egui::ProgressBar::new(task.job().done()).desired_width(110.0));
         } else if ui
-            .add_enabled(is_placed, egui::Button::new("Read it"))
-            .on_hover_text("Takes the light off and looks for cracks, missing cover and stains")
+            .add_enabled(is_placed, egui::Button::new(tr!("Read it")))
+            .on_hover_text(tr!(
+                "Takes the light off and looks for cracks, missing cover and stains"
+            ))
             .clicked()
         {
             shot.read(scene, jobs);
@@ -414,7 +424,7 @@ fn aside(
         keep(ui, shot, added, scene, actions);
     });
     if let Some(why) = &shot.failure {
-        ui.label(format!("⚠ Not read: {why}"));
+        ui.label(tr!("⚠ Not read: {}", why));
     }
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         finds(ui, shot, marked, actions, viewpoint);
@@ -425,37 +435,62 @@ fn aside(
 /// Where it was taken from.
 fn stand(ui: &mut Ui, shot: &Shot, actions: &mut Actions, viewpoint: &mut Viewpoint) {
     match &shot.located {
-        None if shot.placing.is_some() => drop(ui.weak("placing…")),
+        None if shot.placing.is_some() => drop(ui.weak(tr!("placing…"))),
         None => {
             let picked = shot.picks.len();
-            ui.weak(format!(
-                "{picked} picked; 4 are needed where the focal length is known, else 6"
-            ));
+            ui.weak(tr!("{} picked; 4 are needed where the focal length is known, else 6", picked));
         }
         Some(Err(why)) => drop(ui.label(format!("⚠ {why}"))),
         Some(Ok(located)) => {
-            let [x, y, z] = located.pose.position.to_array();
             ui.horizontal_wrapped(|ui| {
-                ui.label(format!(
-                    "Taken from ({x:.2}, {y:.2}, {z:.2}) m; picks fit to {:.1} px",
-                    located.rms_px
+                ui.label(tr!(
+                    "Taken from {}; picks fit to {} px",
+                    point(located.pose.position, 2),
+                    fixed(located.rms_px, 1)
                 ));
-                let button = ui.small_button("Look from there");
-                if button.on_hover_text("The picture as the camera stood").clicked() {
+                let button = ui.small_button(tr!("Look from there"));
+                if button.on_hover_text(tr!("The picture as the camera stood")).clicked() {
                     viewpoint.go(located.pose.camera(&shot.opened.photo.name));
                     actions.ask(Action::Tab("Render"));
                 }
             });
             if let Some(edges) = &located.edges {
-                ui.label(edges.line());
+                ui.label(by_edges(edges));
             }
             if let Some(k) = located.left_out {
-                ui.label(format!("⚠ pick {} contradicts the others and is left out", k + 1));
+                ui.label(tr!("⚠ pick {} contradicts the others and is left out", k + 1));
             }
             if located.other.is_some() {
-                ui.label("⚠ another place fits nearly as well: pick a point out of the plane");
+                ui.label(tr!("⚠ another place fits nearly as well: pick a point out of the plane"));
             }
         }
+    }
+}
+
+/// A place, in m.
+fn point(at: DVec3, decimals: usize) -> String {
+    let [x, y, z] = at.to_array().map(|x| fixed(x, decimals));
+    tr!("({}, {}, {}) m", x, y, z)
+}
+
+/// What the model's edges made of the place.
+fn by_edges(edges: &ByEdges) -> String {
+    let ByEdges { seen, answered, off_px, moved_px, kept } = *edges;
+    match kept {
+        None => tr!(
+            "{} of {} edges of the model that are in sight place it better: it moved by {} px, and \
+             they are off by {} px",
+            answered,
+            seen,
+            fixed(moved_px, 1),
+            fixed(off_px, 1)
+        ),
+        Some(why) => tr!(
+            "placed by the picks alone, since {} ({} of {} in sight)",
+            term(why),
+            answered,
+            seen
+        ),
     }
 }
 
@@ -481,18 +516,18 @@ fn keep(
         }
     };
     if is_told {
-        let button = ui.add_enabled(can && !shot.is_saved, egui::Button::new("Save picks"));
+        let button = ui.add_enabled(can && !shot.is_saved, egui::Button::new(tr!("Save picks")));
         if button.on_hover_text(photo.picks.display().to_string()).clicked() && save(shot) {
             actions.ask(Action::Reload);
         }
     } else {
         let can = can && scene.path.exists();
-        let button = ui.add_enabled(can, egui::Button::new("Add to the evidence"));
+        let button = ui.add_enabled(can, egui::Button::new(tr!("Add to the evidence")));
         let button = button
-            .on_hover_text("Copies it and its picks beside the scene: `intrados attach`")
-            .on_disabled_hover_text(
-                "Six corners first; a bundled scene has no folder to put it in: `intrados new`",
-            );
+            .on_hover_text(tr!("Copies it and its picks beside the scene: `intrados attach`"))
+            .on_disabled_hover_text(tr!(
+                "Six corners first; a bundled scene has no folder to put it in: `intrados new`"
+            ));
         if button.clicked() && save(shot) {
             let photo = &shot.opened.photo;
             let all = scene.structure.photographs.iter().filter(|p| p.member == photo.member);
@@ -500,8 +535,8 @@ fn keep(
             actions.ask(Action::Attach(Box::new(work::attachment(photo))));
         }
     }
-    let button = ui.add_enabled(!shot.before.is_empty(), egui::Button::new("Undo pick"));
-    if button.on_hover_text("The picks as they were before the last one").clicked() {
+    let button = ui.add_enabled(!shot.before.is_empty(), egui::Button::new(tr!("Undo pick")));
+    if button.on_hover_text(tr!("The picks as they were before the last one")).clicked() {
         shot.take_back();
     }
 }
@@ -515,25 +550,27 @@ fn finds(
     viewpoint: &mut Viewpoint,
 ) {
     for (k, (face, _)) in shot.faces.iter().enumerate() {
-        let known = 100.0 * face.known;
-        ui.strong(&face.name).on_hover_text(format!("{known:.0} % of its map is known"));
+        let known = fixed(100.0 * face.known, 0);
+        ui.strong(term(&face.name)).on_hover_text(tr!("{} % of its map is known", known));
         if face.finds.is_empty() {
             let limit = face.narrowest_mm;
             ui.weak(match limit {
-                Some(mm) => format!("nothing; of cracks narrower than {mm:.2} mm nothing is said"),
-                None => "too little is seen to tell".to_owned(),
+                Some(mm) => {
+                    tr!("nothing; of cracks narrower than {} mm nothing is said", fixed(mm, 2))
+                }
+                None => tr!("too little is seen to tell"),
             });
         }
         for (i, find) in face.finds.iter().enumerate() {
             let is_marked = *marked == Some([k, i]);
-            let row = ui.selectable_label(is_marked, &find.what).on_hover_text(&find.course);
+            let row = ui.selectable_label(is_marked, find.what()).on_hover_text(find.course());
             if row.clicked() {
                 *marked = (!is_marked).then_some([k, i]);
             }
             let Some([place, normal]) = find.at.filter(|_| is_marked) else { continue };
             ui.horizontal(|ui| {
-                ui.weak(&find.course);
-                if ui.small_button("Look at it").clicked()
+                ui.weak(find.course());
+                if ui.small_button(tr!("Look at it")).clicked()
                     && let Some(mut camera) = viewpoint.camera().cloned()
                 {
                     camera.position = (place + NEAR * normal).as_vec3();
@@ -558,10 +595,9 @@ fn corners(ui: &mut Ui, shot: &mut Shot, armed: &mut Option<usize>) {
     let mut gone = None;
     egui::Grid::new("photo corners").num_columns(3).striped(true).show(ui, |ui| {
         for (k, place) in shot.opened.outline.corners.iter().enumerate() {
-            let [x, y, z] = place.to_array();
             let is_armed = *armed == Some(k);
-            let row = ui.selectable_label(is_armed, format!("Corner {}", k + 1));
-            if row.on_hover_text(format!("({x:.3}, {y:.3}, {z:.3}) m")).clicked() {
+            let row = ui.selectable_label(is_armed, tr!("Corner {}", k + 1));
+            if row.on_hover_text(point(*place, 3)).clicked() {
                 *armed = (!is_armed).then_some(k);
             }
             let pick = shot.picks.iter().position(|p| p.corner == Some(k));
@@ -569,8 +605,7 @@ fn corners(ui: &mut Ui, shot: &mut Shot, armed: &mut Option<usize>) {
             ui.end_row();
         }
         for k in (0..shot.picks.len()).filter(|k| shot.picks[*k].corner.is_none()) {
-            let [x, y, z] = shot.picks[k].pick.place.to_array();
-            ui.label(format!("({x:.2}, {y:.2}, {z:.2})"));
+            ui.label(point(shot.picks[k].pick.place, 2));
             pick_cells(ui, shot, Some(k), residual, &mut gone);
             ui.end_row();
         }
@@ -594,10 +629,12 @@ fn pick_cells(
         ui.weak("—");
         return;
     };
-    let [u, v] = shot.picks[k].pick.pixel;
-    let off = residual(k).map_or_else(String::new, |px| format!(", {px:.1} px off"));
-    ui.label(format!("{u:.0}, {v:.0}{off}"));
-    if ui.small_button("✖").on_hover_text("Take this pick away").clicked() {
+    let [u, v] = shot.picks[k].pick.pixel.map(|x| fixed(x, 0));
+    ui.label(match residual(k) {
+        Some(px) => tr!("{}, {}, {} px off", u, v, fixed(px, 1)),
+        None => format!("{u}, {v}"),
+    });
+    if ui.small_button("✖").on_hover_text(tr!("Take this pick away")).clicked() {
         *gone = Some(k);
     }
 }

@@ -32,7 +32,7 @@ pub(super) fn show(
     let size = vec2(ui.available_width(), height);
     let (rect, response) = ui.allocate_exact_size(size, Sense::click_and_drag());
     response.widget_info(|| {
-        egui::WidgetInfo::labeled(egui::Role::Image, true, "Corners of the member")
+        egui::WidgetInfo::labeled(egui::Role::Image, true, tr!("Corners of the member"))
     });
     ui.painter().rect_filled(rect, 2.0, ui.visuals().extreme_bg_color);
     if response.dragged() {
@@ -44,7 +44,7 @@ pub(super) fn show(
     let (low, high) =
         ends().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), p| (l.min(*p), h.max(*p)));
     if !(high - low).is_finite() {
-        ui.put(rect, egui::Label::new("no edges"));
+        ui.put(rect, egui::Label::new(tr!("no edges")));
         return None;
     }
     let rotation = DMat3::from_rotation_x(turn.0[1]) * DMat3::from_rotation_y(turn.0[0]);

@@ -3,7 +3,10 @@
 use egui::{Color32, Pos2, Rect, Sense, TextureHandle, Ui, pos2, vec2};
 
 use super::{Photos, Shot, model, work::Find};
-use crate::colours;
+use crate::{
+    colours,
+    lang::{fixed, term},
+};
 
 /// A click so many points beside a find still means it.
 const REACH: f32 = 8.0;
@@ -15,8 +18,8 @@ pub(super) fn show(ui: &mut Ui, photos: &mut Photos, rect: Rect) {
     let response = ui.allocate_rect(rect, Sense::click_and_drag());
     ui.painter().rect_filled(rect, 2.0, ui.visuals().extreme_bg_color);
     let Photos { shot: Some(Ok(shot)), zoom, armed, face, marked, .. } = photos else { return };
-    let name = if face.is_some() { "Face without its light" } else { "Photograph" };
-    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, name));
+    let name = if face.is_some() { tr!("Face without its light") } else { tr!("Photograph") };
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, &name));
     let (texture, size) = shown(shot, *face);
     let size = vec2(size[0], size[1]);
     if response.dragged() {
@@ -90,35 +93,42 @@ fn caption(
     under: Option<[f64; 2]>,
 ) -> String {
     if let Some((face, _)) = face.and_then(|k| shot.faces.get(k)) {
-        let limit = face.narrowest_mm.map_or_else(String::new, |mm| {
-            format!("; of cracks narrower than {mm:.2} mm nothing is said")
-        });
-        return format!(
-            "{}: {:.2} mm a pixel, {:.0} % known{limit}",
-            face.name,
-            face.mm_px,
-            100.0 * face.known
+        let said = tr!(
+            "{}: {} mm a pixel, {} % known",
+            term(&face.name),
+            fixed(face.mm_px, 2),
+            fixed(100.0 * face.known, 0)
         );
+        return match face.narrowest_mm {
+            Some(mm) => {
+                tr!("{}; of cracks narrower than {} mm nothing is said", said, fixed(mm, 2))
+            }
+            None => said,
+        };
     }
     if let Some(corner) = armed {
-        return format!("Click where corner {} is in the photograph", corner + 1);
+        return tr!("Click where corner {} is in the photograph", corner + 1);
     }
     let sight = under.and_then(|at| {
         let located = shot.located()?;
         let sight = shot.opened.site.sights(&located.pose, &[at]).into_iter().next().flatten()?;
         let own = shot.opened.site.surface(sight.member)?;
-        let face = sight.face.and_then(|k| own.faces.get(k)).map_or("end", |f| f.name.as_str());
+        let face = sight
+            .face
+            .and_then(|k| own.faces.get(k))
+            .map_or_else(|| tr!("end|of a member"), |f| term(&f.name));
         let [around, along] = sight.mm_px;
-        Some(format!(
-            "{face}, {:.3} m along, {:.0}°: {:.2} × {:.2} mm a pixel, {:.2} m away",
-            sight.along * own.length(),
-            sight.angle_deg,
-            around,
-            along,
-            sight.distance_m
+        Some(tr!(
+            "{}, {} m along, {}°: {} × {} mm a pixel, {} m away",
+            face,
+            fixed(sight.along * own.length(), 3),
+            fixed(sight.angle_deg, 0),
+            fixed(around, 2),
+            fixed(along, 2),
+            fixed(sight.distance_m, 2)
         ))
     });
     sight.unwrap_or_else(|| {
-        "Click a corner of the drawing, then the same corner in the photograph".into()
+        tr!("Click a corner of the drawing, then the same corner in the photograph")
     })
 }

@@ -16,12 +16,12 @@ use intrados_photo::{
 use intrados_scene::{
     Scene,
     attach::{Attachment, What},
-    structure::Photographed,
+    structure::{Course, Photographed},
 };
 use intrados_stage::{Job, alone, file};
 use intrados_survey::photographed::{self, PhotoError};
 
-use crate::number::plus_minus;
+use crate::{lang::fixed, number::plus_minus};
 
 /// Longer side of a face's picture, pixels; larger maps are thinned.
 const SIDE: usize = 2048;
@@ -76,14 +76,47 @@ pub(super) struct Face {
 
 /// One thing that was found.
 pub(super) struct Find {
-    pub(super) what: String,
-    pub(super) course: String,
+    defect: Defect,
     /// On the face's map, pixels.
     pub(super) on_map: Vec<[f64; 2]>,
     /// In the photograph, pixels.
     pub(super) in_photo: Vec<[f64; 2]>,
     /// Its middle, m, and the unit normal there.
     pub(super) at: Option<[DVec3; 2]>,
+}
+
+impl Find {
+    /// What it is, in words.
+    pub(super) fn what(&self) -> String {
+        let cm2 = |area_m2: f64| fixed(1e4 * area_m2, 0);
+        match &self.defect {
+            Defect::Crack(crack) => {
+                let width = plus_minus(crack.widest_mm, crack.widest_error_mm, "mm");
+                tr!("crack {}, {} m long", width, fixed(crack.length_m, 2))
+            }
+            Defect::Spall { patch, bars_bare: true } => {
+                tr!("spall {} cm², bars bare", cm2(patch.area_m2))
+            }
+            Defect::Spall { patch, bars_bare: false } => tr!("spall {} cm²", cm2(patch.area_m2)),
+            Defect::Rust(patch) => tr!("rust {} cm²", cm2(patch.area_m2)),
+            Defect::Efflorescence(patch) => tr!("efflorescence {} cm²", cm2(patch.area_m2)),
+        }
+    }
+
+    /// Where along its member, and how it runs.
+    pub(super) fn course(&self) -> String {
+        let [low, high] = self.defect.reach_m().map(|x| fixed(x, 2));
+        let Defect::Crack(crack) = &self.defect else {
+            return tr!("{} to {} m along", low, high);
+        };
+        let course = match crack.course {
+            Course::Along => tr!("along|course"),
+            Course::Across => tr!("across|course"),
+            Course::Diagonal => tr!("diagonal|course"),
+            Course::Map => tr!("map|course"),
+        };
+        tr!("{}, {} to {} m along", course, low, high)
+    }
 }
 
 pub(super) fn open(scene: &Scene, photo: Photographed, job: &Job) -> Result<Opened, String> {
@@ -147,8 +180,7 @@ fn shown(surface: &Surface, face: &ReadFace, located: &Located) -> Face {
         let places = surface.places(&face.seen.face, &on_face);
         let seen = places.iter().flatten();
         Find {
-            what: what(defect),
-            course: whither(defect),
+            defect: defect.clone(),
             on_map: on_face.iter().map(|at| map.pixel(*at)).collect(),
             in_photo: seen.filter_map(|[place, _]| located.pose.project(*place)).collect(),
             at: places.get(places.len() / 2).copied().flatten(),
@@ -175,33 +207,6 @@ fn course(defect: &Defect) -> Vec<[f64; 2]> {
                 .map(|[x, y]| [patch.across_m + x * half, patch.along_m + y * half])
                 .to_vec()
         }
-    }
-}
-
-fn what(defect: &Defect) -> String {
-    match defect {
-        Defect::Crack(crack) => {
-            let width = plus_minus(crack.widest_mm, crack.widest_error_mm, "mm");
-            format!("crack {width}, {:.2} m long", crack.length_m)
-        }
-        Defect::Spall { patch, bars_bare } => {
-            let bare = if *bars_bare { ", bars bare" } else { "" };
-            format!("spall {:.0} cm²{bare}", 1e4 * patch.area_m2)
-        }
-        Defect::Rust(patch) => format!("rust {:.0} cm²", 1e4 * patch.area_m2),
-        Defect::Efflorescence(patch) => format!("efflorescence {:.0} cm²", 1e4 * patch.area_m2),
-    }
-}
-
-/// Where along its member, and how it runs.
-fn whither(defect: &Defect) -> String {
-    let [low, high] = defect.reach_m();
-    match defect {
-        Defect::Crack(crack) => {
-            let course = format!("{:?}", crack.course).to_lowercase();
-            format!("{course}, {low:.2} to {high:.2} m along")
-        }
-        _ => format!("{low:.2} to {high:.2} m along"),
     }
 }
 

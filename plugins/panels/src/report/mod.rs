@@ -13,6 +13,7 @@ use intrados_stage::Jobs;
 
 use crate::{
     Action, Actions, Latest, Selection, colours,
+    lang::{fixed, term},
     members::progress,
     number::{percent, plus_minus},
 };
@@ -47,25 +48,32 @@ pub(crate) fn report(
             ui.label(format!("⚠ {failure}"));
         }
         let Some(result) = &latest.result else {
-            ui.label("The table comes when all CT slices have been read, all lives computed and all gauges heard.");
+            ui.label(tr!(
+                "The table comes when all CT slices have been read, all lives computed and all \
+                 gauges heard."
+            ));
             return;
         };
         if scene.0.hash != result.scene_hash {
-            ui.label("⚠ Outdated: the scene has changed since.");
+            ui.label(tr!("⚠ Outdated: the scene has changed since."));
         } else {
-            report.bypass_change_detection().save.row(ui, &scene.0, result, jobs.bypass_change_detection());
+            let save = &mut report.bypass_change_detection().save;
+            save.row(ui, &scene.0, result, jobs.bypass_change_detection());
         }
-        ScrollArea::horizontal().auto_shrink([false, true]).show(ui, |ui| table(ui, result, *selection, &latest, &mut actions));
+        let wide = || ScrollArea::horizontal().auto_shrink([false, true]);
+        wide().show(ui, |ui| table(ui, result, *selection, &latest, &mut actions));
         ui.add_space(12.0);
-        ScrollArea::horizontal().id_salt("ledger").auto_shrink([false, true]).show(ui, |ui| ledger(ui, result));
+        wide().id_salt("ledger").show(ui, |ui| ledger(ui, result));
         ui.add_space(12.0);
         score(ui, result);
         ui.add_space(12.0);
-        ui.strong("What this does not say");
+        ui.strong(tr!("What this does not say"));
         for limit in &result.limits {
-            ui.label(format!("• {limit}"));
+            ui.label(format!("• {}", term(limit)));
         }
-        ui.weak(format!("Graded by {} ({}, {})", result.profile.name, result.profile.source, result.profile.edition));
+        let profile = &result.profile;
+        let source = term(&profile.source);
+        ui.weak(tr!("Graded by {} ({}, {})", profile.name, source, profile.edition));
     });
 }
 
@@ -77,7 +85,14 @@ fn table(
     actions: &mut Actions,
 ) {
     Grid::new("damage").num_columns(6).striped(true).spacing([18.0, 6.0]).show(ui, |ui| {
-        for heading in ["Member", "Kind", "Damage d", "State", "Truth", "Rests on"] {
+        for heading in [
+            tr!("Member"),
+            tr!("Kind"),
+            tr!("Damage d"),
+            tr!("State"),
+            tr!("Truth"),
+            tr!("Rests on"),
+        ] {
             ui.strong(heading);
         }
         ui.end_row();
@@ -91,14 +106,17 @@ fn table(
 /// Every item of evidence and what became of it.
 fn ledger(ui: &mut Ui, result: &Prediction) {
     let unused = result.items.iter().filter(|i| !i.used).count();
-    ui.strong(format!("Evidence: {} items, {unused} not used", result.items.len()));
+    ui.strong(tr!("Evidence: {} items, {} not used", result.items.len(), unused));
     Grid::new("evidence").num_columns(4).striped(true).spacing([18.0, 4.0]).show(ui, |ui| {
         for group in Group::all(&result.items) {
             let first = group.first();
             ui.label(result.name_of(&first.member));
-            ui.label(called(first.source));
+            ui.label(term(called(first.source)));
             ui.label(group.name());
-            ui.label(format!("{}{}", if first.used { "" } else { "⚠ " }, first.verdict()));
+            ui.label(match &first.why {
+                None => tr!("used"),
+                Some(why) => tr!("⚠ not used, because {}", why),
+            });
             ui.end_row();
         }
     });
@@ -115,7 +133,7 @@ fn row(
     if ui.selectable_label(selection.0 == Some(index), &member.name).clicked() {
         actions.ask(Action::Select(Some(index)));
     }
-    ui.label(format!("{:?}", member.kind).to_lowercase());
+    ui.label(term(&format!("{:?}", member.kind).to_lowercase()));
     match member.damage.zip(member.damage_std_error) {
         Some((damage, error)) => ui.label(plus_minus(damage, error, "")),
         None => ui.weak("–"),
@@ -124,16 +142,16 @@ fn row(
         if let Some((verdict, steps)) = latest.state(index) {
             colours::severity(ui, verdict, steps);
         }
-        ui.label(&member.state).on_hover_text(&member.advice);
+        ui.label(term(&member.state)).on_hover_text(term(&member.advice));
     });
     match &member.truth {
-        Some(truth) => ui.label(format!("{:.3}, {}", truth.damage, truth.origin)),
-        None => ui.weak("unknown"),
+        Some(truth) => ui.label(format!("{}, {}", fixed(truth.damage, 3), term(truth.origin))),
+        None => ui.weak(tr!("unknown")),
     };
     let said: Vec<String> = member
         .evidence
         .values()
-        .map(|e| format!("{} {}", called(e.source), plus_minus(e.damage, e.std_error, "")))
+        .map(|e| format!("{} {}", term(called(e.source)), plus_minus(e.damage, e.std_error, "")))
         .collect();
     let basis: Vec<&str> = member.evidence.values().map(|e| e.basis.as_str()).collect();
     let conflict = if member.conflict { "⚠ " } else { "" };
@@ -143,16 +161,16 @@ fn row(
 
 fn score(ui: &mut Ui, result: &Prediction) {
     let score = &result.score;
-    ui.strong("Score where the truth is known");
+    ui.strong(tr!("Score where the truth is known"));
     if score.members == 0 {
-        ui.weak("The truth is known of no member.");
+        ui.weak(tr!("The truth is known of no member."));
         return;
     }
     Grid::new("score").num_columns(2).show(ui, |ui| {
-        let mut row = |name: &str, figure: &Option<Figure>| {
+        let mut row = |name: String, figure: &Option<Figure>| {
             let Some(f) = figure else { return };
             ui.label(name);
-            ui.label(format!(
+            ui.label(tr!(
                 "{} (95 %: {} to {}, n = {})",
                 percent(f.value),
                 percent(f.ci95[0]),
@@ -161,15 +179,15 @@ fn score(ui: &mut Ui, result: &Prediction) {
             ));
             ui.end_row();
         };
-        row("Precision, severe members", &score.precision);
-        row("Recall, severe members", &score.recall);
-        row("Truth within the 95 % interval", &score.coverage_95);
-        row("Mean absolute error of d", &score.mean_absolute_error);
-        row("Damaged zones, IoU", &score.zone_iou);
-        row("Zones whose truth is within the 95 % interval", &score.zone_coverage_95);
+        row(tr!("Precision, severe members"), &score.precision);
+        row(tr!("Recall, severe members"), &score.recall);
+        row(tr!("Truth within the 95 % interval"), &score.coverage_95);
+        row(tr!("Mean absolute error of d"), &score.mean_absolute_error);
+        row(tr!("Damaged zones, IoU"), &score.zone_iou);
+        row(tr!("Zones whose truth is within the 95 % interval"), &score.zone_coverage_95);
         if let Some(dice) = score.slices.dice {
-            ui.label("Dice of the slices' pixels");
-            ui.label(format!("{dice:.3}"));
+            ui.label(tr!("Dice of the slices' pixels"));
+            ui.label(fixed(dice, 3));
             ui.end_row();
         }
     });

@@ -11,7 +11,7 @@ use intrados_scene::Scene;
 use intrados_stage::{Cancelled, Job, Jobs, Task, aside};
 
 use super::Report;
-use crate::{Banners, Log};
+use crate::{Banners, Log, saving::Written};
 
 /// Where to, and the write that runs.
 #[derive(Default)]
@@ -40,13 +40,19 @@ impl Save {
             self.folder = format!("{}-damage", scene.name.replace(['/', '\\'], "-"));
         }
         ui.horizontal(|ui| {
-            let label = ui.label("Save to folder");
-            ui.add(TextEdit::singleline(&mut self.folder).desired_width(240.0)).labelled_by(label.id);
+            let label = ui.label(tr!("Save to folder"));
+            let field = TextEdit::singleline(&mut self.folder).desired_width(240.0);
+            ui.add(field).labelled_by(label.id);
             let folder = self.folder.trim();
             let may = self.task.is_none() && !folder.is_empty();
-            let hint = "Report, tables and models, as `intrados predict --out` writes them: report.html, predict.json, CSV, glTF and VTU";
-            if ui.add_enabled(may, Button::new("Save report")).on_hover_text(hint).clicked() {
-                self.task = Some(begin(folder.into(), Arc::clone(scene), Arc::clone(prediction), jobs));
+            let hint = tr!(
+                "Report, tables and models, as `intrados predict --out` writes them: report.html, \
+                 predict.json, CSV, glTF and VTU"
+            );
+            let save = ui.add_enabled(may, Button::new(tr!("Save report")));
+            if save.on_hover_text(hint).clicked() {
+                let (scene, prediction) = (Arc::clone(scene), Arc::clone(prediction));
+                self.task = Some(begin(folder.into(), scene, prediction, jobs));
             }
         });
     }
@@ -62,7 +68,7 @@ fn begin(
         command: format!("intrados predict {} --out {}", scene.name, folder.display()),
         ..Record::default()
     };
-    Task::spawn(jobs, format!("writing {}", folder.display()), move |job| {
+    Task::spawn(jobs, tr!("writing {}", folder.display()), move |job| {
         let done = aside(|| write(&record, &folder, scene, &prediction, job));
         (folder, done)
     })
@@ -75,13 +81,13 @@ pub(crate) fn save_report(
     prediction: Arc<Prediction>,
     with_pdf: bool,
     jobs: &mut Jobs,
-) -> Task<Result<String, String>> {
+) -> Task<Result<Written, String>> {
     let command = format!("intrados predict {} --out {}", scene.name, folder.display());
     let record = Record { command, pdf: with_pdf, ..Record::default() };
-    Task::spawn(jobs, format!("writing {}", folder.display()), move |job| {
+    Task::spawn(jobs, tr!("writing {}", folder.display()), move |job| {
         let files = aside(|| write(&record, &folder, scene, &prediction, job))
             .map_err(|e| e.to_string())?;
-        Ok(format!("{files} files into {}", folder.display()))
+        Ok(Written { files: Some(files), path: folder })
     })
 }
 
@@ -105,13 +111,11 @@ pub(crate) fn take(mut report: ResMut<Report>, mut banners: ResMut<Banners>, mut
     let Ok((folder, done)) = done else { return };
     let folder = folder.display();
     match done {
-        Ok(files) => log.say(format!("wrote {files} files into {folder}")),
-        Err(RecordError::Cancelled(Cancelled)) => {
-            log.say(format!("writing {folder} was cancelled"))
-        }
+        Ok(files) => log.say(tr!("wrote {} files into {}", files, folder)),
+        Err(RecordError::Cancelled(Cancelled)) => log.say(tr!("writing {} was cancelled", folder)),
         Err(error) => {
-            log.say(format!("⚠ not saved: {error}"));
-            banners.cannot("Not saved", &error.to_string());
+            log.say(tr!("⚠ not saved: {}", error));
+            banners.cannot(&tr!("Not saved"), &error.to_string());
         }
     }
 }

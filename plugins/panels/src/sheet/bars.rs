@@ -1,13 +1,15 @@
 //! Damage of a member's zones as bars.
 
 use egui::{Rect, Sense, Ui, pos2, vec2};
-use intrados_damage::{
-    verdict::Basis,
-    zone::{ZONES, place},
-};
+use intrados_damage::{verdict::Basis, zone::ZONES};
 use intrados_predict::Predicted;
 
-use crate::{colours, moment::Course, number::plus_minus};
+use crate::{
+    colours,
+    lang::{fixed, term},
+    moment::{Course, place},
+    number::plus_minus,
+};
 
 /// Height of the bars, points.
 const HEIGHT: f32 = 60.0;
@@ -17,7 +19,7 @@ pub(super) fn bars(ui: &mut Ui, predicted: &Predicted) {
     let (rect, response) =
         ui.allocate_exact_size(vec2(ui.available_width().min(420.0), HEIGHT), Sense::hover());
     response.widget_info(|| {
-        egui::WidgetInfo::labeled(egui::Role::Image, true, "Damage along the member")
+        egui::WidgetInfo::labeled(egui::Role::Image, true, tr!("Damage along the member"))
     });
     let width = rect.width() / ZONES as f32;
     let y = |d: f64| rect.bottom() - rect.height() * d.clamp(0.0, 1.0) as f32;
@@ -49,27 +51,42 @@ pub(super) fn bars(ui: &mut Ui, predicted: &Predicted) {
     if let Some(at) = response.hover_pos() {
         let zone = (((at.x - rect.left()) / width) as usize).min(ZONES - 1);
         let said = predicted.zones.0[zone]
-            .map_or("nothing known".into(), |r| plus_minus(r.value, r.std_error, ""));
-        response.on_hover_text(format!(
-            "{} of the axis: {said}, {}",
-            place(zone),
-            predicted.basis[zone].name()
-        ));
+            .map_or_else(|| tr!("nothing known"), |r| plus_minus(r.value, r.std_error, ""));
+        let basis = term(predicted.basis[zone].name());
+        response.on_hover_text(tr!("{} of the axis: {}, {}", place(zone), said.trim(), basis));
     }
-    ui.weak("from the start of the axis to its end; lines: 95 % intervals; paler: forecast; hatched: unknown");
+    ui.weak(tr!("from the start of the axis to its end; lines: 95 % intervals; paler: forecast; \
+         hatched: unknown"));
 }
 
-/// Damage that is foretold, zone by zone: of now on the left, of the end of the forecast on the
-/// right.
-pub(super) fn foretold(ui: &mut Ui, course: &Course) {
-    let name = format!("Forecast now and in {:.0} years", course.years);
-    two(ui, &name, [course.now.map(Some), course.later.map(Some)], ["now", "then"]);
-    ui.weak(format!("each zone by the forecast: left now, right in {:.0} years", course.years));
+/// Damage by the life, zone by zone: of now on the left, of another year on the right.
+pub(super) fn foretold(ui: &mut Ui, course: &Course, years: f64) {
+    let [now, then] = [0.0, years].map(|years| course.at(years));
+    let (Some(now), Some(then)) = (now, then) else { return };
+    let sides = [now.map(Some), then.map(Some)];
+    let (name, said) = match years < 0.0 {
+        false => {
+            let years = fixed(years, 0);
+            (
+                tr!("Forecast now and in {} years", years),
+                tr!("each zone by the forecast: left now, right in {} years", years),
+            )
+        }
+        true => {
+            let years = fixed(-years, 0);
+            (
+                tr!("Its life now and {} years ago", years),
+                tr!("each zone by its life: left now, right {} years ago", years),
+            )
+        }
+    };
+    two(ui, &name, sides, [tr!("now"), tr!("then|in future")]);
+    ui.weak(said);
 }
 
 /// Damage zone by zone, of two predictions or times: one on the left, one on the right; nothing
 /// where it is unknown.
-pub(super) fn two(ui: &mut Ui, name: &str, sides: [[Option<f64>; ZONES]; 2], called: [&str; 2]) {
+pub(super) fn two(ui: &mut Ui, name: &str, sides: [[Option<f64>; ZONES]; 2], called: [String; 2]) {
     let size = vec2(ui.available_width().min(420.0), 0.6 * HEIGHT);
     let (rect, response) = ui.allocate_exact_size(size, Sense::hover());
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, name));
@@ -91,8 +108,8 @@ pub(super) fn two(ui: &mut Ui, name: &str, sides: [[Option<f64>; ZONES]; 2], cal
     if let Some(at) = response.hover_pos() {
         let zone = (((at.x - rect.left()) / width) as usize).min(ZONES - 1);
         let said = [0, 1].map(|side| match sides[side][zone] {
-            Some(damage) => format!("{damage:.2} {}", called[side]),
-            None => format!("unknown {}", called[side]),
+            Some(damage) => format!("{} {}", fixed(damage, 2), called[side]),
+            None => tr!("unknown {}", called[side]),
         });
         response.on_hover_text(format!("{}: {}, {}", place(zone), said[0], said[1]));
     }

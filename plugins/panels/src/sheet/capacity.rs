@@ -8,13 +8,17 @@ use intrados_mechanics::{
     analysis::{MemberOutcome, Outcome},
     member::Meshing,
     plugin::{Analyses, Analysis, Analyze, Stop},
-    strength::Strength,
+    strength::{Mode, Strength},
 };
-use intrados_predict::MemberPrediction;
+use intrados_predict::{CrackCheck, MemberPrediction};
 use intrados_scene::{Member, Scene};
 use intrados_stage::Work;
 
-use crate::{Action, Actions, number::copied};
+use crate::{
+    Action, Actions,
+    lang::{fixed, local, term},
+    number::copied,
+};
 
 /// Asks for analyses, and for their end.
 #[derive(bevy_ecs::system::SystemParam)]
@@ -40,20 +44,25 @@ pub(super) fn capacity(
     actions: &mut Actions,
 ) {
     if let Some(c) = told.and_then(|t| t.crack_check.as_ref()) {
-        let verdict = if c.exceeded { "⚠ wider than" } else { "✔ within" };
-        ui.label(format!(
-            "widest crack {:.2} mm ({}), {verdict} the {} mm of {}",
-            c.width_mm,
-            called(c.source),
-            c.limit_mm,
-            c.exposure
-        ));
+        ui.label(checked(c));
     }
     if let Some(c) = told.and_then(|t| t.capacity.as_ref()) {
-        ui.label(format!("It {}.", c.told())).on_hover_text(c.because.as_str());
+        let factor = c.load_factor;
+        let times = format!("{} ± {}", fixed(factor.value, 2), fixed(factor.std_error, 2));
+        let loads = c.loads.join(", ");
+        let bears = match c.mode {
+            Mode::None => tr!("It bears at least {} times {}.", times, loads),
+            mode => tr!("It bears {} times {} (fails by {}).", times, loads, term(mode.words())),
+        };
+        ui.label(bears).on_hover_text(c.because.as_str());
+        let [cost, error] = [c.cost.value, c.cost.std_error].map(|share| 100.0 * share);
+        if cost > 0.0 || error > 0.0 {
+            let [cost, error] = [cost, error].map(|percent| fixed(percent, 0));
+            ui.label(tr!("Damage costs {} ± {} % of its strength.", cost, error));
+        }
     }
     let Some(assembly) = scene.structure.assembly_of(&member.id) else {
-        ui.weak("Its body is known as a surface alone: no load can be put on it.");
+        ui.weak(tr!("Its body is known as a surface alone: no load can be put on it."));
         return;
     };
     let can_be_raised = scene.structure.loads.iter().any(|l| l.action.can_be_raised());
@@ -73,18 +82,35 @@ pub(super) fn capacity(
     let analysis = mechanics.analyses.get(model);
     let is_done = analysis.is_some_and(|a| matches!(a.work, Work::Done(_)));
     ui.horizontal_wrapped(|ui| {
-        let hint = "Loads, pours, creep and damage over its whole life, as `intrados analyze`";
-        if !is_done && ui.button("Compute its stress").on_hover_text(hint).clicked() {
+        let hint = tr!("Loads, pours, creep and damage over its whole life, as `intrados analyze`");
+        if !is_done && ui.button(tr!("Compute its stress")).on_hover_text(hint).clicked() {
             mechanics.begin(model, false);
         }
-        let hint = "Then raises its loads until it fails, as `intrados analyze --to-failure`";
+        let hint = tr!("Then raises its loads until it fails, as `intrados analyze --to-failure`");
         let may = !has_strength && can_be_raised;
-        if may && ui.button("Compute what it bears").on_hover_text(hint).clicked() {
+        if may && ui.button(tr!("Compute what it bears")).on_hover_text(hint).clicked() {
             mechanics.begin(model, true);
         }
     });
     if !can_be_raised {
-        ui.weak("No load of this scene can be raised to failure.");
+        ui.weak(tr!("No load of this scene can be raised to failure."));
+    }
+}
+
+/// The widest crack beside what is admitted.
+fn checked(c: &CrackCheck) -> String {
+    let (width, source) = (fixed(c.width_mm, 2), term(called(c.source)));
+    let limit = local(c.limit_mm.to_string());
+    if c.exceeded {
+        tr!(
+            "widest crack {} mm ({}), ⚠ wider than the {} mm of {}",
+            width,
+            source,
+            limit,
+            c.exposure
+        )
+    } else {
+        tr!("widest crack {} mm ({}), ✔ within the {} mm of {}", width, source, limit, c.exposure)
     }
 }
 
@@ -94,9 +120,10 @@ fn running(ui: &mut Ui, analysis: &Analysis) -> bool {
     let last = seen.count().checked_sub(1).and_then(|last| seen.shot(last));
     let done = seen.skin().zip(last).map_or(0.0, |(skin, shot)| skin.progress(shot.time));
     ui.horizontal(|ui| {
-        let text = format!("{:.0} % of its life", 100.0 * done);
+        let text = tr!("{} % of its life", fixed(100.0 * done, 0));
         ui.add(ProgressBar::new(done).desired_width(140.0).text(text));
-        ui.button("Stop computing").on_hover_text("What has been found until then stays").clicked()
+        let hint = tr!("What has been found until then stays");
+        ui.button(tr!("Stop computing")).on_hover_text(hint).clicked()
     })
     .inner
 }
@@ -106,11 +133,11 @@ fn result(ui: &mut Ui, analysis: &Analysis, member: &Member, actions: &mut Actio
     let outcome = match &analysis.work {
         Work::Running(_) => return false,
         Work::Cancelled => {
-            ui.label("Its stress was stopped before its end.");
+            ui.label(tr!("Its stress was stopped before its end."));
             return false;
         }
         Work::Failed(why) => {
-            ui.label(format!("⚠ Not computed: {why}"));
+            ui.label(tr!("⚠ Not computed: {}", why));
             return false;
         }
         Work::Done(life) => &life.outcome,
@@ -122,7 +149,7 @@ fn result(ui: &mut Ui, analysis: &Analysis, member: &Member, actions: &mut Actio
     if let Some(strength) = &outcome.strength {
         bears(ui, strength);
     }
-    if ui.link("See it over its life").clicked() {
+    if ui.link(tr!("See it over its life")).clicked() {
         actions.ask(Action::Tab("Stress"));
     }
     outcome.strength.is_some()
@@ -131,7 +158,7 @@ fn result(ui: &mut Ui, analysis: &Analysis, member: &Member, actions: &mut Actio
 /// What a user must know before believing any of it.
 fn doubts(ui: &mut Ui, outcome: &Outcome) {
     if !outcome.complaint.is_empty() {
-        ui.label(format!("⚠ ended early: {}", outcome.complaint));
+        ui.label(tr!("⚠ ended early: {}", outcome.complaint));
     }
     outcome.warnings.iter().for_each(|why| drop(ui.label(format!("⚠ {why}"))));
 }
@@ -141,19 +168,19 @@ fn stresses(ui: &mut Ui, own: &MemberOutcome) {
     let mpa = |pa: f64| pa / 1e6;
     egui::Grid::new("capacity").num_columns(2).spacing([8.0, 2.0]).show(ui, |ui| {
         for (what, value) in [
-            ("compression", format!("{:.1} MPa", mpa(own.peak_compression_pa))),
-            ("tension", format!("{:.2} MPa", mpa(own.peak_tension_pa))),
-            ("bars", format!("{:.0} MPa", mpa(own.peak_bar_stress_pa))),
-            ("cracks by load", format!("{:.2} mm", 1e3 * own.max_crack_width_m)),
+            (tr!("compression"), format!("{} MPa", fixed(mpa(own.peak_compression_pa), 1))),
+            (tr!("tension"), format!("{} MPa", fixed(mpa(own.peak_tension_pa), 2))),
+            (tr!("bars"), format!("{} MPa", fixed(mpa(own.peak_bar_stress_pa), 0))),
+            (tr!("cracks by load"), format!("{} mm", fixed(1e3 * own.max_crack_width_m, 2))),
         ] {
             ui.label(what);
             copied(ui, RichText::new(value));
             ui.end_row();
         }
         if let Some(pipe) = own.pipe {
-            ui.label("steel pipe");
-            let [around, along] = [pipe.around_pa, pipe.along_pa].map(mpa);
-            copied(ui, RichText::new(format!("{around:.0} MPa around, {along:.0} along")));
+            ui.label(tr!("steel pipe"));
+            let [around, along] = [pipe.around_pa, pipe.along_pa].map(|pa| fixed(mpa(pa), 0));
+            copied(ui, RichText::new(tr!("{} MPa around, {} along", around, along)));
             ui.end_row();
         }
     });
@@ -162,16 +189,16 @@ fn stresses(ui: &mut Ui, own: &MemberOutcome) {
 /// Its load at failure, and how it fails.
 fn bears(ui: &mut Ui, strength: &Strength) {
     let peak = &strength.peak;
-    let text = format!(
-        "It bears {:.2} × what acts: {:.0} kN at {:.1} mm",
-        peak.load_factor,
-        1e-3 * peak.load_n,
-        1e3 * peak.displacement_m
+    let text = tr!(
+        "It bears {} × what acts: {} kN at {} mm",
+        fixed(peak.load_factor, 2),
+        fixed(1e-3 * peak.load_n, 0),
+        fixed(1e3 * peak.displacement_m, 1)
     );
     copied(ui, RichText::new(text).strong());
-    ui.label(format!("and fails by {}: {}", strength.mode.words(), strength.because));
+    ui.label(tr!("and fails by {}: {}", term(strength.mode.words()), strength.because));
     if let Some(yields) = &strength.yielding {
-        ui.label(format!("A bar yields first at {:.2} × what acts.", yields.load_factor));
+        ui.label(tr!("A bar yields first at {} × what acts.", fixed(yields.load_factor, 2)));
     }
-    ui.weak(format!("Raised: {}. Followed until {}.", strength.loads.join(", "), strength.ended));
+    ui.weak(tr!("Raised: {}. Followed until {}.", strength.loads.join(", "), strength.ended));
 }

@@ -8,6 +8,7 @@ use intrados_stage::Estimate;
 use super::bars;
 use crate::{
     history::Earlier,
+    lang::term,
     number::{copied, plus_minus},
 };
 
@@ -17,24 +18,25 @@ const CLEAR: f64 = 1.96;
 pub(super) fn compare(ui: &mut Ui, member: &Member, predicted: &Predicted, earlier: &Earlier) {
     ui.weak(&earlier.title);
     let Some(was) = earlier.member(&member.id) else {
-        ui.label("This member was not in it.");
+        ui.label(tr!("This member was not in it."));
         return;
     };
     let Some(before) = was.damage() else {
-        ui.label("Nothing was known of it then.");
+        ui.label(tr!("Nothing was known of it then."));
         return;
     };
     let now = predicted.damage;
     for (when, damage, state) in
-        [("then", before, &was.state), ("now", now, &predicted.verdict.state)]
+        [(tr!("then|in the past"), before, &was.state), (tr!("now"), now, &predicted.verdict.state)]
     {
         let value = plus_minus(damage.value, damage.std_error, "");
-        copied(ui, format!("{when}: d = {}, {state}", value.trim()).into());
+        copied(ui, format!("{when}: d = {}, {}", value.trim(), term(state)).into());
     }
     ui.label(changed(before, now));
     let sides = [was.zones, predicted.zones].map(|zones| zones.0.map(|z| z.map(|z| z.value)));
-    bars::two(ui, "Damage along the member, then and now", sides, ["then", "now"]);
-    ui.weak("each zone: left then, right now");
+    let name = tr!("Damage along the member, then and now");
+    bars::two(ui, &name, sides, [tr!("then|in the past"), tr!("now")]);
+    ui.weak(tr!("each zone: left then, right now"));
 }
 
 /// What has changed, as far as both errors let anybody say. Both predictions share what they rest
@@ -45,9 +47,9 @@ fn changed(before: Estimate, now: Estimate) -> String {
     let value = plus_minus(by.abs(), error, "");
     let value = value.trim();
     match by.abs() > CLEAR * error {
-        true if by > 0.0 => format!("It has grown by {value}."),
-        true => format!("It is less by {value}: what is known has changed, not the concrete."),
-        false => format!("{value} apart, which the errors of both leave open."),
+        true if by > 0.0 => tr!("It has grown by {}.", value),
+        true => tr!("It is less by {}: what is known has changed, not the concrete.", value),
+        false => tr!("{} apart, which the errors of both leave open.", value),
     }
 }
 

@@ -11,7 +11,10 @@ use intrados_scene::{
     attach::{Listed, listed},
 };
 
-use crate::{Action, Actions};
+use crate::{
+    Action, Actions,
+    lang::{fixed, term},
+};
 
 /// Rows shown at first.
 const SHOWN: usize = 12;
@@ -39,18 +42,20 @@ impl Listing {
         }
         let own: Vec<&Listed> = self.all.iter().filter(|l| l.member == member.id).collect();
         if own.is_empty() && member.slices.is_empty() {
-            ui.weak("Nothing was measured on it, nobody has looked at it.");
+            ui.weak(tr!("Nothing was measured on it, nobody has looked at it."));
         }
         let is_made = |s: &&Slices| matches!(s, Slices::Drawn { .. } | Slices::Scanned { .. });
         if member.slices.iter().any(|s| is_made(&s)) {
-            ui.label("CT slices that the program makes itself of what the scene plants in it.");
+            ui.label(tr!(
+                "CT slices that the program makes itself of what the scene plants in it."
+            ));
         }
         let shown = if self.is_long { own.len() } else { SHOWN };
         for one in own.iter().take(shown) {
             row(ui, one, actions);
         }
         if own.len() > SHOWN {
-            let text = if self.is_long { "fewer".into() } else { format!("all {}", own.len()) };
+            let text = if self.is_long { tr!("fewer") } else { tr!("all {}", own.len()) };
             if ui.link(text).clicked() {
                 self.is_long = !self.is_long;
             }
@@ -61,8 +66,12 @@ impl Listing {
         for group in Group::all(&items) {
             let first = group.first();
             let mark = if first.used { "✔" } else { "⚠" };
-            let source = called(first.source);
-            ui.label(format!("{mark} {source}, {}: {}", group.name(), first.verdict()));
+            let source = term(called(first.source));
+            let verdict = match &first.why {
+                None => tr!("used"),
+                Some(why) => tr!("not used, because {}", why),
+            };
+            ui.label(format!("{mark} {source}, {}: {verdict}", group.name()));
         }
     }
 }
@@ -70,15 +79,16 @@ impl Listing {
 /// One thing that is known: when, what, where, how much.
 fn row(ui: &mut Ui, one: &Listed, actions: &mut Actions) {
     ui.horizontal_wrapped(|ui| {
-        let hint = format!("Detach “{}”; Ctrl+Z attaches it again", one.name);
+        let hint = tr!("Detach “{}”; Ctrl+Z attaches it again", one.name);
         let detach = ui.small_button("✖").on_hover_text(&hint);
         detach.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, &hint));
         if detach.clicked() {
             actions.ask(Action::Detach(one.member.clone(), one.name.clone()));
         }
-        ui.monospace(one.date.map_or("undated   ".into(), |d| d.to_string()));
-        ui.strong(one.kind);
-        ui.label(&one.value).on_hover_text(&one.name);
+        let undated = || format!("{:10}", tr!("undated"));
+        ui.monospace(one.date.map_or_else(undated, |d| d.to_string()));
+        ui.strong(term(one.kind));
+        ui.label(term(&one.value)).on_hover_text(&one.name);
         ui.weak(place(one));
     });
 }
@@ -87,12 +97,13 @@ fn row(ui: &mut Ui, one: &Listed, actions: &mut Actions) {
 fn place(one: &Listed) -> String {
     let along = one.along.map(|[from, to]| {
         if from.to_bits() == to.to_bits() {
-            format!("at {:.0} %", 100.0 * from)
+            tr!("at {} %", fixed(100.0 * from, 0))
         } else {
-            format!("{:.0}–{:.0} %", 100.0 * from, 100.0 * to)
+            format!("{}–{} %", fixed(100.0 * from, 0), fixed(100.0 * to, 0))
         }
     });
-    let side = one.face.clone().or_else(|| one.angle_deg.map(|a| format!("{a:.0}°")));
-    let height = one.height_m.map(|h| format!("{h:.2} m up"));
+    let face = one.face.as_deref().map(term);
+    let side = face.or_else(|| one.angle_deg.map(|a| format!("{}°", fixed(a, 0))));
+    let height = one.height_m.map(|h| tr!("{} m up", fixed(h, 2)));
     [along, side, height].into_iter().flatten().collect::<Vec<_>>().join(", ")
 }

@@ -4,8 +4,12 @@ use egui::{Align2, Color32, Rect, Sense, Ui, pos2, vec2};
 use intrados_damage::evidence::called;
 use intrados_predict::{Defect, MemberPrediction};
 use intrados_scene::Member;
+use intrados_survey::photographed::FaceSeen;
 
-use crate::colours;
+use crate::{
+    colours,
+    lang::{fixed, local, term},
+};
 
 /// Height of the map, points.
 const HEIGHT: f32 = 150.0;
@@ -13,34 +17,75 @@ const HEIGHT: f32 = 150.0;
 const MARGIN: [f32; 2] = [34.0, 30.0];
 /// Most defects in the list.
 const MOST: usize = 24;
+/// Of a face of which less is seen nothing is.
+const GLIMPSE: f64 = 0.02;
 
 pub(super) fn faces(ui: &mut Ui, member: &Member, told: &MemberPrediction) {
     if !told.defects.is_empty() {
         map(ui, member, told);
-        ui.weak("unrolled: along it from left to right, once around from below to above");
+        ui.weak(tr!("unrolled: along it from left to right, once around from below to above"));
         for (number, defect) in told.defects.iter().enumerate().take(MOST) {
             row(ui, number, defect);
         }
         if told.defects.len() > MOST {
-            ui.weak(format!("and {} more, in the report", told.defects.len() - MOST));
+            ui.weak(tr!("and {} more, in the report", told.defects.len() - MOST));
         }
     }
-    if let Some(seen) = told.photographed() {
-        ui.label(seen);
+    if !told.faces.is_empty() {
+        ui.label(photographed(&told.faces));
+    }
+}
+
+/// What photographs show of all faces and what they do not, one sentence.
+fn photographed(faces: &[FaceSeen]) -> String {
+    let (seen, hidden): (Vec<&FaceSeen>, Vec<&FaceSeen>) =
+        faces.iter().partition(|f| f.seen >= GLIMPSE);
+    let share = |f: &&FaceSeen| {
+        let (percent, face) = (fixed(100.0 * f.seen, 0), term(&f.face));
+        match f.narrowest_mm {
+            None => tr!("{} % of {}", percent, face),
+            Some(mm) => tr!("{} % of {} (cracks from {} mm)", percent, face, fixed(mm, 2)),
+        }
+    };
+    let mut told: Vec<String> = seen.iter().map(share).collect();
+    if !hidden.is_empty() {
+        let faces: Vec<String> = hidden.iter().map(|f| term(&f.face)).collect();
+        told.push(tr!("nothing of {}: what is there is unknown", faces.join(", ")));
+    }
+    tr!("Photographs show {}.", told.join(", "))
+}
+
+/// How large a defect is. Of what the engines say, the words that sizes have are known.
+fn sized(size: &str) -> String {
+    if let Some((size, sections)) = size.split_once(", in ")
+        && let Some((some, all)) =
+            sections.strip_suffix(" sections").and_then(|s| s.split_once(" of "))
+    {
+        return tr!("{}, in {} of {} sections", sized(size), some, all);
+    }
+    let known = |end: &str| size.strip_suffix(end).map(|number| local(number.to_owned()));
+    if let Some(mm) = known(" mm wide") {
+        tr!("{} mm wide", mm)
+    } else if let Some(mm) = known(" mm deep") {
+        tr!("{} mm deep", mm)
+    } else if let Some(percent) = known(" % of the section") {
+        tr!("{} % of the section", percent)
+    } else {
+        size.to_owned()
     }
 }
 
 fn row(ui: &mut Ui, number: usize, defect: &Defect) {
     ui.horizontal_wrapped(|ui| {
         ui.strong(format!("{}", number + 1));
-        ui.label(defect.kind);
-        let extent = defect.quantity().unwrap_or_default();
-        ui.label([defect.size.as_str(), &extent].join(" ").trim().to_owned());
+        ui.label(term(defect.kind));
+        let extent = local(defect.quantity().unwrap_or_default());
+        ui.label([sized(&defect.size), extent].join(" ").trim().to_owned());
         if let Some([from, to]) = defect.along {
-            ui.weak(format!("at {:.0} % of the axis", 50.0 * (from + to)));
+            ui.weak(tr!("at {} % of the axis", fixed(50.0 * (from + to), 0)));
         }
-        let when = defect.date.as_deref().unwrap_or("undated");
-        ui.weak(format!("{}, {when}", called(defect.source)));
+        let when = defect.date.clone().unwrap_or_else(|| tr!("undated"));
+        ui.weak(format!("{}, {when}", term(called(defect.source))));
     });
     if let Some(change) = defect.change() {
         ui.weak(change);
@@ -72,8 +117,9 @@ fn thumbnail(ui: &mut Ui, number: usize, picture: &intrados_ct::Picture) {
 fn map(ui: &mut Ui, member: &Member, told: &MemberPrediction) {
     let width = ui.available_width().min(640.0);
     let (whole, response) = ui.allocate_exact_size(vec2(width, HEIGHT), Sense::hover());
-    response
-        .widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "Faces with defects"));
+    response.widget_info(|| {
+        egui::WidgetInfo::labeled(egui::Role::Image, true, tr!("Faces with defects"))
+    });
     let length = f64::from(member.frame.axis.length()).max(1e-3);
     let area =
         Rect::from_min_max(whole.min + vec2(MARGIN[0], 4.0), whole.max - vec2(6.0, MARGIN[1]));
@@ -132,7 +178,7 @@ fn frame(ui: &Ui, area: Rect, length: f64) {
         let share = quarter as f32 / 4.0;
         let at = pos2(area.left() + area.width() * share, area.bottom() + 14.0);
         let unit = if quarter == 4 { " m" } else { "" };
-        let text = format!("{:.1}{unit}", length * f64::from(share));
+        let text = format!("{}{unit}", fixed(length * f64::from(share), 1));
         let align = match quarter {
             0 => Align2::LEFT_TOP,
             4 => Align2::RIGHT_TOP,

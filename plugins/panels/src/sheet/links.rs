@@ -4,7 +4,7 @@ use egui::{RichText, Ui};
 use intrados_predict::{MemberPrediction, SliceReading};
 use intrados_scene::{Member, Scene};
 
-use crate::{Action, Actions, number::copied};
+use crate::{Action, Actions, lang::fixed, number::copied};
 
 /// Most slices in the list.
 const MOST: usize = 12;
@@ -21,7 +21,7 @@ pub(super) fn links(
     for photo in photographs {
         is_empty = false;
         let date = photo.date.map_or(String::new(), |d| format!(", {d}"));
-        if ui.link(format!("Photograph {}{date}", photo.name)).clicked() {
+        if ui.link(tr!("Photograph {}{}", photo.name, date)).clicked() {
             actions.ask(Action::Photograph(photo.file.clone()));
         }
     }
@@ -36,21 +36,22 @@ pub(super) fn links(
         }
     }
     if slices.len() > MOST {
-        ui.weak(format!("and {} more slices that show less", slices.len() - MOST));
+        ui.weak(tr!("and {} more slices that show less", slices.len() - MOST));
     }
     for gauge in told.map_or(&[][..], |t| &t.gauges) {
         is_empty = false;
         let (scale, unit) = if gauge.unit == "m" { (1e3, "mm") } else { (1e6, "µε") };
-        let (read, error) = (scale * gauge.read, scale * gauge.std_error);
+        let [read, error, sound] =
+            [gauge.read, gauge.std_error, gauge.sound].map(|x| fixed(scale * x, 2));
         ui.horizontal_wrapped(|ui| {
-            ui.strong(format!("Gauge {}", gauge.gauge));
-            copied(ui, RichText::new(format!("{read:.2} ± {error:.2} {unit}")));
-            ui.weak(format!("sound {:.2} {unit}, test {}", scale * gauge.sound, gauge.test));
+            ui.strong(tr!("Gauge {}", gauge.gauge));
+            copied(ui, RichText::new(format!("{read} ± {error} {unit}")));
+            ui.weak(tr!("sound {} {}, test {}", sound, unit, gauge.test));
         });
     }
     if is_empty {
         let comes = !member.slices.is_empty() && told.is_none();
-        ui.weak(if comes { "They come with the prediction." } else { "None." });
+        ui.weak(if comes { tr!("They come with the prediction.") } else { tr!("None.") });
     }
 }
 
@@ -58,8 +59,12 @@ pub(super) fn links(
 fn said(slice: &SliceReading) -> String {
     let place = slice
         .along
-        .map_or_else(|| slice.name.clone(), |along| format!("at {:.0} %", 100.0 * along));
+        .map_or_else(|| slice.name.clone(), |along| tr!("at {} %", fixed(100.0 * along, 0)));
     let widest = slice.cracks.iter().map(|c| c.width_mm).fold(0.0, f64::max);
-    let crack = if widest > 0.0 { format!(", crack {widest:.2} mm wide") } else { String::new() };
-    format!("Slice {place}: {:.2} % pores{crack}", 100.0 * slice.porosity.value)
+    let pores = fixed(100.0 * slice.porosity.value, 2);
+    if widest > 0.0 {
+        tr!("Slice {}: {} % pores, crack {} mm wide", place, pores, fixed(widest, 2))
+    } else {
+        tr!("Slice {}: {} % pores", place, pores)
+    }
 }

@@ -4,6 +4,7 @@
 mod bars;
 mod capacity;
 mod compare;
+mod course;
 mod evidence;
 mod faces;
 mod links;
@@ -21,7 +22,8 @@ use capacity::Mechanics;
 use crate::{
     Action, Actions, Latest, Selection, colours,
     history::History,
-    moment::Course,
+    lang::{fixed, term},
+    moment::{Course, Courses, Moment},
     number::{copied, plus_minus},
 };
 
@@ -34,6 +36,7 @@ pub(crate) fn member(
     scene: Option<Res<CurrentScene>>,
     latest: Res<Latest>,
     history: Res<History>,
+    (courses, moment): (Res<Courses>, Res<Moment>),
     selection: Res<Selection>,
     mut mechanics: Mechanics,
     mut listing: ResMut<Listing>,
@@ -70,7 +73,7 @@ pub(crate) fn member(
         listing.bypass_change_detection().show(ui, scene, member, result, &mut actions);
     });
     if let Some(told) = told {
-        section(ui, "Forecast", |ui| foretold(ui, told));
+        section(ui, "Forecast", |ui| foretold(ui, told, courses.get(index), *moment));
     }
     section(ui, "Capacity", |ui| {
         capacity::capacity(ui, scene, member, told, &mut mechanics, &mut actions);
@@ -80,7 +83,7 @@ pub(crate) fn member(
     });
 }
 
-/// A part of the sheet under its name.
+/// A part of the sheet under its name, which is a [`term`] and, in English, what it is kept by.
 fn section(ui: &mut Ui, name: &str, draw: impl FnOnce(&mut Ui)) {
     part(ui, name, true, draw);
 }
@@ -88,7 +91,7 @@ fn section(ui: &mut Ui, name: &str, draw: impl FnOnce(&mut Ui)) {
 /// The same, which may be closed at first.
 fn part(ui: &mut Ui, name: &str, is_open: bool, draw: impl FnOnce(&mut Ui)) {
     ui.add_space(4.0);
-    egui::CollapsingHeader::new(RichText::new(name).strong())
+    egui::CollapsingHeader::new(RichText::new(term(name)).strong())
         .id_salt(name)
         .default_open(is_open)
         .show_unindented(ui, draw);
@@ -96,20 +99,21 @@ fn part(ui: &mut Ui, name: &str, is_open: bool, draw: impl FnOnce(&mut Ui)) {
 
 fn head(ui: &mut Ui, member: &Member) {
     ui.label(RichText::new(&member.name).heading().strong());
-    let assumed = if member.concrete_assumed { " (assumed)" } else { "" };
+    let mut concrete = member.concrete.clone();
+    if member.concrete_assumed {
+        concrete = tr!("{} (assumed)", concrete);
+    }
     let size = member.bounds[1] - member.bounds[0];
-    let kind = format!("{:?}", member.kind);
-    ui.weak(format!(
-        "{kind}, {}{assumed}, {:.2} × {:.2} × {:.2} m",
-        member.concrete, size.x, size.y, size.z
-    ));
+    let [x, y, z] = size.to_array().map(|edge| fixed(edge, 2));
+    let kind = term(&format!("{:?}", member.kind));
+    ui.weak(format!("{kind}, {concrete}, {x} × {y} × {z} m"));
 }
 
 /// Damage with its error, state with its probability, and what to do.
 fn standing(ui: &mut Ui, index: usize, latest: &Latest, actions: &mut Actions) {
     let (Some(predicted), Some((verdict, steps))) = (latest.member(index), latest.state(index))
     else {
-        ui.label("No evidence so far, which is not the same as sound.");
+        ui.label(tr!("No evidence so far, which is not the same as sound."));
         return;
     };
     if latest.is_outdated(index) {
@@ -119,31 +123,31 @@ fn standing(ui: &mut Ui, index: usize, latest: &Latest, actions: &mut Actions) {
     copied(ui, RichText::new(format!("d = {}", damage.trim())).size(18.0).strong());
     ui.horizontal_wrapped(|ui| {
         colours::severity(ui, verdict, steps);
-        ui.strong(&verdict.state);
+        ui.strong(term(&verdict.state));
     });
     probable(ui, predicted, latest);
     let by = match verdict.within_months {
         None => String::new(),
-        Some(0) => " (at once)".into(),
-        Some(1) => " (within a month)".into(),
-        Some(months) => format!(" (within {months} months)"),
+        Some(0) => tr!(" (at once)"),
+        Some(1) => tr!(" (within a month)"),
+        Some(months) => tr!(" (within {} months)", months),
     };
-    ui.label(format!("{}{by}", verdict.advice));
+    ui.label(term(&verdict.advice) + &by);
     if predicted.conflict {
-        ui.label("⚠ Pieces of evidence contradict each other.");
+        ui.label(tr!("⚠ Pieces of evidence contradict each other."));
     }
 }
 
 /// Says that numbers are of before the last change.
 pub(crate) fn outdated(ui: &mut Ui, latest: &Latest, actions: &mut Actions) {
     ui.horizontal_wrapped(|ui| {
-        ui.colored_label(ui.visuals().warn_fg_color, "⚠ Outdated");
+        ui.colored_label(ui.visuals().warn_fg_color, tr!("⚠ Outdated"));
         if latest.cancelled {
-            if ui.button("Predict again").clicked() {
+            if ui.button(tr!("Predict again")).clicked() {
                 actions.ask(Action::Predict);
             }
         } else {
-            ui.label("of before the last change; predicting again");
+            ui.label(tr!("of before the last change; predicting again"));
         }
     });
 }
@@ -154,12 +158,12 @@ fn probable(ui: &mut Ui, predicted: &Predicted, latest: &Latest) {
     let states: Vec<(String, f64)> = latest.states().iter().filter_map(known).collect();
     egui::Grid::new("probability").num_columns(3).spacing([8.0, 2.0]).show(ui, |ui| {
         for (state, p) in states {
-            ui.label(&state);
+            ui.label(term(&state));
             let (rect, _) = ui.allocate_exact_size(egui::vec2(90.0, 9.0), egui::Sense::hover());
             ui.painter().rect_filled(rect, 2.0, ui.visuals().extreme_bg_color);
             let filled = rect.with_max_x(rect.left() + rect.width() * p.clamp(0.0, 1.0) as f32);
             ui.painter().rect_filled(filled, 2.0, ui.visuals().selection.bg_fill);
-            ui.label(format!("{:.0} %", 100.0 * p));
+            ui.label(format!("{} %", fixed(100.0 * p, 0)));
             ui.end_row();
         }
     });
@@ -169,18 +173,20 @@ fn probable(ui: &mut Ui, predicted: &Predicted, latest: &Latest) {
 fn ways(ui: &mut Ui, scene: &Scene, member: &Member, actions: &mut Actions) {
     ui.add_space(2.0);
     ui.horizontal_wrapped(|ui| {
-        if ui.button("Look at it").on_hover_text("Fills the picture with it (F)").clicked() {
+        let look = ui.button(tr!("Look at it"));
+        if look.on_hover_text(tr!("Fills the picture with it (F)")).clicked() {
             actions.ask(Action::Tab("Structure"));
             actions.ask(Action::Frame);
         }
-        if !member.slices.is_empty() && ui.button("Its slices").clicked() {
+        if !member.slices.is_empty() && ui.button(tr!("Its slices")).clicked() {
             actions.ask(Action::Slice(0));
         }
-        if scene.structure.assembly_of(&member.id).is_some() && ui.button("Its stress").clicked() {
+        let is_computed = scene.structure.assembly_of(&member.id).is_some();
+        if is_computed && ui.button(tr!("Its stress")).clicked() {
             actions.ask(Action::Tab("Stress"));
         }
-        let attach = ui.button("Attach evidence…");
-        let hint = "Findings, CT slices, tables (A); or drop the files on the window";
+        let attach = ui.button(tr!("Attach evidence…"));
+        let hint = tr!("Findings, CT slices, tables (A); or drop the files on the window");
         if attach.on_hover_text(hint).clicked() {
             actions.ask(Action::Fill(Vec::new(), None));
         }
@@ -190,49 +196,67 @@ fn ways(ui: &mut Ui, scene: &Scene, member: &Member, actions: &mut Actions) {
 /// What each source says, and what contradicts what.
 fn sources(ui: &mut Ui, told: &MemberPrediction) {
     if told.evidence.is_empty() {
-        ui.weak("Nothing that could be used.");
+        ui.weak(tr!("Nothing that could be used."));
     }
     for (source, e) in &told.evidence {
         ui.horizontal_wrapped(|ui| {
-            ui.strong(called(source));
+            ui.strong(term(called(source)));
             copied(ui, RichText::new(format!("d = {}", plus_minus(e.damage, e.std_error, ""))));
         });
         ui.label(&e.basis);
     }
     for conflict in &told.conflicts {
-        ui.label(format!("⚠ contradicting: {conflict}"));
+        ui.label(tr!("⚠ contradicting: {}", conflict));
     }
 }
 
+/// How its damage grows over the years; zone by zone for the year that is looked at, the last one
+/// where that is now.
+fn life(ui: &mut Ui, course: &Course, moment: Moment) {
+    let years = if moment.is_now() { course.end() } else { moment.years };
+    if let Some((zone, now, later)) = course.worst(years).filter(|_| years > 0.0) {
+        ui.label(tr!(
+            "In {} years it loses most in {} of the axis: d = {} becomes {}.",
+            fixed(years, 0),
+            zone,
+            fixed(now, 2),
+            fixed(later, 2)
+        ));
+    }
+    bars::foretold(ui, course, years);
+    course::plot(ui, course, moment);
+}
+
 /// What its life by mechanics and rust says.
-fn foretold(ui: &mut Ui, told: &MemberPrediction) {
+fn foretold(ui: &mut Ui, told: &MemberPrediction, course: Option<&Course>, moment: Moment) {
     let Some(forecast) = told.evidence.get("forecast") else {
-        ui.weak("No forecast: nothing is known of its loads or its exposure.");
+        ui.weak(tr!("No forecast: nothing is known of its loads or its exposure."));
         return;
     };
     let value = plus_minus(forecast.damage, forecast.std_error, "");
     copied(ui, RichText::new(format!("d = {}", value.trim())));
     ui.label(&forecast.basis);
-    if let Some(course) = Course::of(told) {
-        let (zone, now, later) = course.worst();
-        let years = course.years;
-        ui.label(format!(
-            "In {years:.0} years it loses most in {zone} of the axis: d = {now:.2} becomes {later:.2}."
-        ));
-        bars::foretold(ui, &course);
+    if let Some(course) = course {
+        life(ui, course, moment);
     }
     let rust = forecast.details.get("rust");
     let Some(rust) = rust else { return };
     if let Some(why) = rust["why_not"].as_str() {
-        ui.weak(format!("Rust: {why}"));
+        ui.weak(tr!("Rust: {}", why));
         return;
     }
     let number = |name: &str| rust[name].as_f64();
-    let begins = number("depassivation_years")
-        .map_or("not within a thousand years".into(), |y| format!("after {y:.0} years"));
-    let likely = number("probability_depassivated").unwrap_or(0.0);
-    ui.label(format!(
-        "Bars begin to rust {begins}, most probably; with {:.0} % they have by now.",
-        100.0 * likely
-    ));
+    let likely = fixed(100.0 * number("probability_depassivated").unwrap_or(0.0), 0);
+    ui.label(match number("depassivation_years") {
+        None => tr!(
+            "Bars begin to rust not within a thousand years, most probably; \
+             with {} % they have by now.",
+            likely
+        ),
+        Some(years) => tr!(
+            "Bars begin to rust after {} years, most probably; with {} % they have by now.",
+            fixed(years, 0),
+            likely
+        ),
+    });
 }

@@ -3,21 +3,21 @@
 use egui::{RichText, Ui};
 use intrados_scene::Scene;
 
-use crate::{Action, Actions, Latest, colours, number::plus_minus};
+use crate::{Action, Actions, Latest, colours, lang::term, number::plus_minus};
 
 /// So many of the worst members are named.
 const WORST: usize = 8;
 
 pub(super) fn overview(ui: &mut Ui, scene: &Scene, latest: &Latest, actions: &mut Actions) {
     ui.label(RichText::new(&scene.name).heading().strong());
-    ui.weak(format!("{} members", scene.members.len()));
+    ui.weak(tr!("{} members", scene.members.len()));
     ui.add_space(4.0);
     let known: Vec<usize> =
         (0..scene.members.len()).filter(|i| latest.member(*i).is_some()).collect();
     states(ui, scene, latest, known.len());
     worst(ui, scene, latest, known, actions);
     ui.add_space(6.0);
-    ui.label("Click a member, in the picture or in the list, for its sheet.");
+    ui.label(tr!("Click a member, in the picture or in the list, for its sheet."));
 }
 
 /// How many members are in which state, by what is most probable of each.
@@ -31,16 +31,16 @@ fn states(ui: &mut Ui, scene: &Scene, latest: &Latest, known: usize) {
         }
     }
     counts.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
-    let row = |ui: &mut Ui, count: usize, state: &str| {
+    let row = |ui: &mut Ui, count: usize, state: String| {
         ui.horizontal_wrapped(|ui| {
             ui.strong(count.to_string());
             ui.label(state);
         });
     };
-    counts.iter().for_each(|(state, count)| row(ui, *count, state));
+    counts.iter().for_each(|(state, count)| row(ui, *count, term(state)));
     let unknown = scene.members.len() - known;
     if unknown > 0 {
-        row(ui, unknown, "no evidence so far, which is not the same as sound");
+        row(ui, unknown, tr!("no evidence so far, which is not the same as sound"));
     }
 }
 
@@ -57,7 +57,7 @@ fn worst(
         return;
     }
     ui.add_space(6.0);
-    ui.strong("The most damaged");
+    ui.strong(tr!("The most damaged"));
     for index in known.into_iter().take(WORST) {
         ui.horizontal_wrapped(|ui| {
             if let Some((verdict, steps)) = latest.state(index) {

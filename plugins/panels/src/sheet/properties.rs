@@ -40,9 +40,8 @@ impl Properties {
             if scene.path.exists() {
                 self.send(ui, scene, member, actions);
             } else {
-                ui.weak(
-                    "This scene is part of the program: “New structure…” makes one that is yours.",
-                );
+                ui.weak(tr!("This scene is part of the program: \
+                     “New structure…” makes one that is yours."));
             }
             ui.add_enabled_ui(scene.path.exists(), |ui| self.values.show(ui));
         });
@@ -55,24 +54,26 @@ impl Properties {
         let filled = self.values.settings();
         let file = scene.path.file_name().unwrap_or_default().to_string_lossy();
         ui.horizontal_wrapped(|ui| {
-            let hint = format!(
-                "Writes them into {file}, where comments stay, and predicts again. Ctrl+Z takes it back."
+            let hint = tr!(
+                "Writes them into {}, where comments stay, and predicts again. \
+                 Ctrl+Z takes it back.",
+                file
             );
-            let apply = ui.add_enabled(count > 0 && filled.is_ok(), Button::new("Apply"));
+            let apply = ui.add_enabled(count > 0 && filled.is_ok(), Button::new(tr!("Apply")));
             if apply.on_hover_text(hint).clicked()
                 && let Ok((settings, names)) = &filled
             {
-                let what = format!("change {names} of {of}");
+                let what = tr!("change {} of {}", names, of);
                 actions.ask(Action::Amend(settings.clone(), what));
             }
-            if ui.add_enabled(count > 0, Button::new("Discard")).clicked() {
+            if ui.add_enabled(count > 0, Button::new(tr!("Discard"))).clicked() {
                 self.values.discard();
             }
             match (&filled, count) {
                 (Err(why), _) => ui.label(format!("⚠ {why}")),
-                (Ok(_), 0) => ui.weak(format!("as in {file}")),
-                (Ok(_), 1) => ui.label("one value changed"),
-                (Ok(_), n) => ui.label(format!("{n} values changed")),
+                (Ok(_), 0) => ui.weak(tr!("as in {}", file)),
+                (Ok(_), 1) => ui.label(tr!("one value changed")),
+                (Ok(_), n) => ui.label(tr!("{} values changed", n)),
             }
         });
     }

@@ -9,15 +9,15 @@ use std::{path::PathBuf, sync::Arc};
 
 use bevy_ecs::prelude::*;
 use egui::{
-    Color32, ComboBox, DragValue, ProgressBar, Rect, Sense, Slider, TextureHandle, TextureOptions,
-    Ui, pos2, vec2,
+    Color32, ComboBox, ProgressBar, Rect, Sense, Slider, TextureHandle, TextureOptions, Ui, pos2,
+    vec2,
 };
 use glam::Vec3;
 use intrados_light::plugin::Widening;
 use intrados_mechanics::{
     analysis::Outcome,
     member::Meshing,
-    plugin::{Analyses, Analysis, Analyze, Stop},
+    plugin::{Analyses, Analysis, Analyze, ShownAt, Stop},
     skin::{Skin, Snapshot},
 };
 use intrados_scene::{Camera, Scene, SurfaceDamage, plugin::CurrentScene};
@@ -28,7 +28,9 @@ use intrados_stage::{
 use quantity::Quantity;
 
 use crate::{
-    Actions, Log, Selection, colours, members,
+    Actions, Log, Selection, colours,
+    lang::{drag, fixed, local, term},
+    members,
     number::significant,
     surface::{self, Drawn, Surface, bounds, hand, place},
 };
@@ -51,6 +53,8 @@ pub(crate) struct Stress {
     scale: Option<f32>,
     /// Which equilibrium; none: the newest.
     moment: Option<usize>,
+    /// The moment of the structure that was last followed.
+    followed: ShownAt,
     /// Largest edge of an element, m; 0: one that suits the section.
     element: f64,
     /// Only the selected member of a model of several.
@@ -74,6 +78,7 @@ impl Default for Stress {
             quantity: Quantity::default(),
             scale: None,
             moment: None,
+            followed: ShownAt::default(),
             element: 0.0,
             alone: false,
             mesh: true,
@@ -137,9 +142,9 @@ impl Stress {
 pub(crate) fn take(mut stress: ResMut<Stress>, mut log: ResMut<Log>) {
     let Some(done) = Task::take(&mut stress.task) else { return };
     match done {
-        Ok(Ok(what)) => log.say(format!("wrote {what}")),
-        Ok(Err(error)) => log.say(format!("not written: {error}")),
-        Err(_) => log.say("not written: the writer broke off"),
+        Ok(Ok(what)) => log.say(tr!("wrote {}", what)),
+        Ok(Err(error)) => log.say(tr!("not written: {}", error)),
+        Err(_) => log.say(tr!("not written: the writer broke off")),
     }
 }
 
@@ -148,6 +153,7 @@ pub(crate) fn stress(
     scene: Option<Res<CurrentScene>>,
     selection: Res<Selection>,
     analyses: Option<Res<Analyses>>,
+    at: Res<ShownAt>,
     damage: Query<&SurfaceDamage>,
     mut widening: ResMut<Widening>,
     mut stress: ResMut<Stress>,
@@ -160,10 +166,10 @@ pub(crate) fn stress(
     let (Some(scene), Some(analyses)) = (scene, analyses) else { return };
     let scene = &scene.0;
     let Some(member) = selection.0.and_then(|i| scene.members.get(i)) else {
-        return choose(ui, scene, "Select a member to see its stress:", &mut actions);
+        return choose(ui, scene, &tr!("Select a member to see its stress:"), &mut actions);
     };
     let Some(model) = scene.structure.assembly_of(&member.id).map(|a| a.id.as_str()) else {
-        let why = format!("{} has no closed surface of concrete: it is not computed.", member.name);
+        let why = tr!("{} has no closed surface of concrete: it is not computed.", member.name);
         return choose(ui, scene, &why, &mut actions);
     };
     let of = (scene.hash.clone(), model.to_owned());
@@ -184,6 +190,13 @@ pub(crate) fn stress(
     let (Some(skin), true) = (skin, count > 0) else {
         return waiting(ui, analysis);
     };
+    if *at != stress.followed {
+        // The last equilibrium until then, as of the whole structure.
+        let shots = analysis.seen.shots();
+        let passed = |until: f64| shots.partition_point(|shot| shot.time <= until);
+        stress.moment = at.0.map(|until| passed(until).saturating_sub(1));
+        stress.followed = *at;
+    }
     // More moments come while it runs.
     let index = stress.moment.unwrap_or(usize::MAX).min(count - 1);
     let Some(shot) = analysis.seen.shot(index) else { return };
@@ -208,13 +221,14 @@ pub(crate) fn stress(
 
 /// Which members can be computed.
 fn choose(ui: &mut Ui, scene: &Scene, why: &str, actions: &mut Actions) {
-    let none = "No member of this scene can be computed: none has a closed surface of concrete.";
+    let none =
+        tr!("No member of this scene can be computed: none has a closed surface of concrete.");
     members::choose(
         ui,
         scene,
         |m| scene.structure.assembly_of(&m.id).is_some(),
         why,
-        none,
+        &none,
         actions,
     );
 }
@@ -230,7 +244,8 @@ fn run(
 ) {
     ui.separator();
     if analysis.is_some_and(|a| a.work.is_running()) {
-        if ui.button("⏹ Stop").on_hover_text("What has been found until then stays").clicked() {
+        let hint = tr!("What has been found until then stays");
+        if ui.button(tr!("⏹ Stop")).on_hover_text(hint).clicked() {
             stop.write(Stop(model.to_owned()));
         }
         // The job counts the iterations of solvers too.
@@ -243,31 +258,29 @@ fn run(
         ui.add(
             ProgressBar::new(done)
                 .desired_width(160.0)
-                .text(format!("{:.0} % of its life", 100.0 * done)),
+                .text(tr!("{} % of its life", fixed(100.0 * done, 0))),
         );
         ui.ctx().request_repaint_after(std::time::Duration::from_millis(50));
         return;
     }
-    let name = if analysis.is_some() { "⟲ Analyze again" } else { "▶ Analyze" };
-    if ui
-        .button(name)
-        .on_hover_text("Loads, pours, creep and damage over the member's whole history, as `intrados analyze` computes them")
-        .clicked()
-    {
+    let name = if analysis.is_some() { tr!("⟲ Analyze again") } else { tr!("▶ Analyze") };
+    let hint = tr!("Loads, pours, creep and damage over the member's whole history, \
+         as `intrados analyze` computes them");
+    if ui.button(name).on_hover_text(hint).clicked() {
         let element = (stress.element > 0.0).then_some(stress.element);
-        begin.write(Analyze { model: model.to_owned(), meshing: Meshing { element }, to_failure: false });
+        let meshing = Meshing { element };
+        begin.write(Analyze { model: model.to_owned(), meshing, to_failure: false });
         (stress.moment, stress.shown, stress.picked) = (None, None, None);
     }
-    let label = ui.label("Elements of");
-    let drag = DragValue::new(&mut stress.element).range(0.0..=2.0).speed(0.005).custom_formatter(
-        |v, _| match v {
-            v if v < 0.005 => "a suitable size".into(),
-            v => format!("{v:.3} m"),
-        },
-    );
-    ui.add(drag).labelled_by(label.id).on_hover_text(
-        "Largest edge of an element; drag to 0 for a quarter of the section's smallest side",
-    );
+    let label = ui.label(tr!("Elements of"));
+    let edge =
+        drag(&mut stress.element).range(0.0..=2.0).speed(0.005).custom_formatter(|v, _| match v {
+            v if v < 0.005 => tr!("a suitable size"),
+            v => format!("{} m", fixed(v, 3)),
+        });
+    ui.add(edge).labelled_by(label.id).on_hover_text(tr!(
+        "Largest edge of an element; drag to 0 for a quarter of the section's smallest side"
+    ));
     if stress.element < 0.005 {
         stress.element = 0.0;
     }
@@ -277,11 +290,14 @@ fn run(
 fn invite(ui: &mut Ui, name: &str) {
     ui.add_space(24.0);
     ui.vertical_centered(|ui| {
-        ui.heading("Not analysed yet");
-        ui.label(format!(
-            "Analyze follows {name} through its loads, pours and years: stress, creep, cracks."
+        ui.heading(tr!("Not analysed yet"));
+        ui.label(tr!(
+            "Analyze follows {} through its loads, pours and years: stress, creep, cracks.",
+            name
         ));
-        ui.weak("The newest equilibrium is shown while it runs; a fine mesh may take minutes.");
+        ui.weak(tr!(
+            "The newest equilibrium is shown while it runs; a fine mesh may take minutes."
+        ));
     });
 }
 
@@ -291,7 +307,7 @@ fn waiting(ui: &mut Ui, analysis: &Analysis) {
     ui.vertical_centered(|ui| match &analysis.work {
         Work::Running(_) => {
             ui.spinner();
-            ui.label("Looking for the first equilibrium…");
+            ui.label(tr!("Looking for the first equilibrium…"));
         }
         _ => state(ui, analysis, ""),
     });
@@ -302,10 +318,10 @@ fn state(ui: &mut Ui, analysis: &Analysis, part: &str) {
     match &analysis.work {
         Work::Running(_) => {}
         Work::Cancelled => {
-            ui.label("⏹ Stopped: what had been found until then is shown.");
+            ui.label(tr!("⏹ Stopped: what had been found until then is shown."));
         }
         Work::Failed(why) => {
-            ui.colored_label(ui.visuals().error_fg_color, format!("⚠ Not computed: {why}"));
+            ui.colored_label(ui.visuals().error_fg_color, tr!("⚠ Not computed: {}", why));
         }
         Work::Done(life) => ended(ui, &life.outcome, part),
     }
@@ -313,7 +329,7 @@ fn state(ui: &mut Ui, analysis: &Analysis, part: &str) {
 
 fn ended(ui: &mut Ui, outcome: &Outcome, part: &str) {
     if !outcome.complaint.is_empty() {
-        let text = format!("⚠ Ended early: {}", outcome.complaint);
+        let text = tr!("⚠ Ended early: {}", outcome.complaint);
         ui.add(
             egui::Label::new(egui::RichText::new(&text).color(ui.visuals().warn_fg_color))
                 .truncate(),
@@ -325,7 +341,7 @@ fn ended(ui: &mut Ui, outcome: &Outcome, part: &str) {
             ui.weak(text);
         }
         if !outcome.notes.is_empty() {
-            ui.label(format!("ℹ {} notes", outcome.notes.len()))
+            ui.label(tr!("ℹ {} notes", outcome.notes.len()))
                 .on_hover_text(outcome.notes.join("\n"));
         }
     });
@@ -341,24 +357,25 @@ fn controls(ui: &mut Ui, stress: &mut Stress, skin: &Skin, auto: f32) {
                 ui.selectable_value(&mut stress.quantity, quantity, quantity.name(skin));
             }
         });
-        let label = ui.label("Deformation ×");
+        let label = ui.label(tr!("Deformation ×"));
         let mut scale = stress.scale.unwrap_or(auto);
-        let slider = Slider::new(&mut scale, 0.0..=(20.0 * auto).max(100.0))
+        let slider = lang::slide(&mut scale, 0.0..=(20.0 * auto).max(100.0))
             .logarithmic(true)
             .smallest_positive(0.1)
             .max_decimals(1);
-        if ui.add(slider).labelled_by(label.id).on_hover_text("1 is true to scale").changed() {
+        let response = ui.add(slider).labelled_by(label.id);
+        if response.on_hover_text(tr!("1 is true to scale")).changed() {
             stress.scale = Some(scale);
         }
-        if stress.scale.is_some() && ui.small_button("auto").clicked() {
+        if stress.scale.is_some() && ui.small_button(tr!("auto")).clicked() {
             stress.scale = None;
         }
-        ui.checkbox(&mut stress.mesh, "Mesh");
+        ui.checkbox(&mut stress.mesh, tr!("Mesh"));
         if skin.parts.len() > 1 {
-            ui.checkbox(&mut stress.alone, "This member alone");
+            ui.checkbox(&mut stress.alone, tr!("This member alone"));
         }
-        ui.checkbox(&mut stress.whole_life, "Same colours at all times")
-            .on_hover_text("One range over the whole life instead of one for each moment");
+        ui.checkbox(&mut stress.whole_life, tr!("Same colours at all times"))
+            .on_hover_text(tr!("One range over the whole life instead of one for each moment"));
     });
 }
 
@@ -373,26 +390,28 @@ fn time(
 ) {
     ui.horizontal(|ui| {
         let mut go = |to: Option<usize>| stress.moment = to;
-        if ui.small_button("◀").on_hover_text("Equilibrium before").clicked() && index > 0 {
+        let before = ui.small_button("◀").on_hover_text(tr!("Equilibrium before"));
+        if before.clicked() && index > 0 {
             go(Some(index - 1));
         }
-        if ui.small_button("▶").on_hover_text("Next equilibrium").clicked() {
+        if ui.small_button("▶").on_hover_text(tr!("Next equilibrium")).clicked() {
             go((index + 1 < count).then_some(index + 1));
         }
-        let label = ui.label("Step");
+        let label = ui.label(tr!("Step"));
         let mut number = index + 1;
         ui.spacing_mut().slider_width = 220.0;
         if ui.add(Slider::new(&mut number, 1..=count)).labelled_by(label.id).changed() {
             // At the end it stays with the newest.
             go((number < count).then(|| number - 1));
         }
-        ui.label(format!("of {count}{}", if running { " so far" } else { "" }));
+        ui.label(if running { tr!("of {} so far", count) } else { tr!("of {}", count) });
         ui.separator();
         ui.strong(moment(shot.time));
-        ui.label(format!("load factor {:.2}", shot.load_factor));
+        ui.label(tr!("load factor {}", fixed(shot.load_factor, 2)));
         if shot.residual > 1e-3 {
-            ui.label("⚠ loose")
-                .on_hover_text(format!("{:.1e} of all that acts is out of balance", shot.residual));
+            let residual = significant(shot.residual, 2);
+            ui.label(tr!("⚠ loose"))
+                .on_hover_text(tr!("{} of all that acts is out of balance", residual));
         }
     });
 }
@@ -411,17 +430,20 @@ fn cracks(ui: &mut Ui, damage: &Query<&SurfaceDamage>, widening: &mut ResMut<Wid
         return;
     }
     ui.horizontal_wrapped(|ui| {
-        let missing =
-            if spalls > 0 { format!(" and {spalls} places without cover") } else { String::new() };
-        ui.label(format!(
-            "The Render tab shows {count} cracks up to {:.2} mm{missing}; drawn",
-            1e3 * widest
-        ));
+        let widest = fixed(1e3 * widest, 2);
+        ui.label(match spalls {
+            0 => tr!("The Render tab shows {} cracks up to {} mm; drawn", count, widest),
+            _ => tr!(
+                "The Render tab shows {} cracks up to {} mm and {} places without cover; drawn",
+                count,
+                widest,
+                spalls
+            ),
+        });
         let mut times = widening.0;
-        let drag =
-            DragValue::new(&mut times).range(1.0..=50.0).speed(0.1).max_decimals(1).suffix(" ×");
+        let factor = drag(&mut times).range(1.0..=50.0).speed(0.1).max_decimals(1).suffix(" ×");
         // The picture begins anew: not while it is dragged.
-        let response = ui.add(drag).on_hover_text("1 is true to scale");
+        let response = ui.add(factor).on_hover_text(tr!("1 is true to scale"));
         let id = response.id.with("wanted");
         if response.dragged() || response.has_focus() {
             ui.data_mut(|d| d.insert_temp(id, times));
@@ -431,16 +453,16 @@ fn cracks(ui: &mut Ui, damage: &Query<&SurfaceDamage>, widening: &mut ResMut<Wid
         {
             widening.0 = times;
         }
-        ui.label("as wide.");
+        ui.label(tr!("as wide."));
     });
 }
 
 /// A moment for people.
 pub(crate) fn moment(time: f64) -> String {
     match time / DAY {
-        d if d.abs() < 0.1 => format!("{:.0} min", time / 60.0),
-        d if d < 1000.0 => format!("day {}", significant(d, 3)),
-        d => format!("year {:.1}", d * DAY / YEAR),
+        d if d.abs() < 0.1 => format!("{} min", fixed(time / 60.0, 0)),
+        d if d < 1000.0 => tr!("day {}", significant(d, 3)),
+        d => tr!("year {}", fixed(d * DAY / YEAR, 1)),
     }
 }
 
@@ -477,7 +499,7 @@ impl View<'_> {
             egui::WidgetInfo::labeled(
                 egui::Role::Image,
                 true,
-                format!("Stress: {}", stress.quantity.name(self.skin)),
+                tr!("Stress: {}", stress.quantity.name(self.skin)),
             )
         });
         let camera = self.camera(stress, rect);
@@ -492,7 +514,7 @@ impl View<'_> {
             Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0)),
             Color32::WHITE,
         );
-        legend(ui, rect, stress.quantity, stress.quantity.name(self.skin), shown);
+        legend(ui, rect, stress.quantity, &stress.quantity.name(self.skin), shown);
         triad(ui, rect, &camera);
         let under = response.hover_pos().and_then(|at| self.vertex(shown, &camera, rect, at));
         if response.clicked() {
@@ -671,50 +693,62 @@ impl View<'_> {
             return;
         };
         egui::Grid::new(("numbers", all)).num_columns(2).spacing([12.0, 1.0]).show(ui, |ui| {
-            let mut row = |name: &str, value: String| {
+            let mut row = |name: String, value: String| {
                 ui.weak(name);
                 ui.label(value);
                 ui.end_row();
             };
-            row("at", format!("{:.3}, {:.3}, {:.3} m", p.x, p.y, p.z));
-            row("moved", format!("{:.3}, {:.3}, {:.3} mm", 1e3 * u.x, 1e3 * u.y, 1e3 * u.z));
+            let [x, y, z] = p.to_array().map(|x| fixed(x, 3));
+            row(tr!("at|point"), tr!("{}, {}, {} m", x, y, z));
+            let [x, y, z] = u.to_array().map(|x| fixed(1e3 * x, 3));
+            row(tr!("moved"), tr!("{}, {}, {} mm", x, y, z));
             for quantity in Quantity::all().filter(|q| all || !matches!(q, Quantity::Component(_)))
             {
                 let value = quantity.one(self.skin, self.shot, v);
                 let unit = if quantity == Quantity::Damage { "" } else { quantity.unit().0 };
-                row(
-                    quantity.name(self.skin),
-                    format!("{} {unit}", significant(f64::from(value), 3)),
-                );
+                let value = significant(f64::from(value), 3);
+                row(quantity.name(self.skin), format!("{value} {unit}"));
             }
         });
     }
 
+    /// What the picture shows, in a line.
+    fn caption(&self, quantity: Quantity, shown: &Shown) -> String {
+        let [low, high] = shown.range.map(|v| significant(f64::from(v), 3));
+        tr!(
+            "{}, {} to {} {}, {}, displacements × {}; Intrados {}",
+            quantity.name(self.skin),
+            low,
+            high,
+            term(quantity.unit().0),
+            moment(self.shot.time),
+            local(shown.key.scale.to_string()),
+            env!("CARGO_PKG_VERSION")
+        )
+    }
+
     fn saving(&self, ui: &mut Ui, stress: &mut Stress, jobs: &mut Jobs) {
-        let label = ui.label("Save as");
+        let label = ui.label(tr!("Save as"));
         ui.add(egui::TextEdit::singleline(&mut stress.path).desired_width(200.0))
             .labelled_by(label.id);
         let path = PathBuf::from(stress.path.trim());
         let kind = save::Kind::of(&path);
-        let hint = "The name ends in .png: this picture; in .csv: every point of the surface at this moment";
-        if ui
-            .add_enabled(
-                kind.is_some() && stress.task.is_none(),
-                egui::Button::new("Save picture or table"),
-            )
-            .on_hover_text(hint)
-            .clicked()
+        let hint = tr!("The name ends in .png: this picture; \
+             in .csv: every point of the surface at this moment");
+        let can = kind.is_some() && stress.task.is_none();
+        let button = egui::Button::new(tr!("Save picture or table"));
+        if ui.add_enabled(can, button).on_hover_text(hint).clicked()
             && let (Some(kind), Some(shown)) = (kind, &stress.shown)
         {
-            let (unit, _) = stress.quantity.unit();
-            let [low, high] = shown.range.map(|v| significant(f64::from(v), 3));
-            let what = format!(
-                "{}, {low} to {high} {unit}, {}, displacements × {}; Intrados {}",
-                stress.quantity.name(self.skin),
-                moment(self.shot.time),
-                shown.key.scale,
-                env!("CARGO_PKG_VERSION")
-            );
+            // Said here: the thread that writes speaks English.
+            let what = match kind {
+                save::Kind::Picture => self.caption(stress.quantity, shown),
+                save::Kind::Table => tr!(
+                    "{} points of the surface at {}",
+                    save::points(self.skin, self.shot),
+                    moment(self.shot.time)
+                ),
+            };
             let (image, background) = (shown.drawn.image.clone(), ui.visuals().extreme_bg_color);
             let (skin, shot) = (Arc::clone(self.skin), Arc::clone(self.shot));
             stress.task = Some(Task::spawn(
@@ -722,12 +756,12 @@ impl View<'_> {
                 format!("writing {}", path.display()),
                 move |_| match kind {
                     save::Kind::Picture => save::picture(image, background, &path, &what),
-                    save::Kind::Table => save::table(&skin, &shot, &path),
+                    save::Kind::Table => save::table(&skin, &shot, &path, &what),
                 },
             ));
         }
         if kind.is_none() {
-            ui.weak("The name must end in .png or .csv.");
+            ui.weak(tr!("The name must end in .png or .csv."));
         }
     }
 }
@@ -783,7 +817,7 @@ fn legend(ui: &Ui, rect: Rect, quantity: Quantity, name: &str, shown: &Shown) {
         )
     };
     right(rect.top() + 6.0, name.into());
-    right(rect.top() + 20.0, quantity.unit().0.into());
+    right(rect.top() + 20.0, term(quantity.unit().0));
     let (least, most) = shown
         .faces
         .iter()
@@ -791,8 +825,8 @@ fn legend(ui: &Ui, rect: Rect, quantity: Quantity, name: &str, shown: &Shown) {
         .filter_map(|v| shown.values.get(*v as usize))
         .fold((f32::INFINITY, f32::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
     if least <= most {
-        right(bar.bottom() + 10.0, format!("max {}", significant(f64::from(most), 3)));
-        right(bar.bottom() + 24.0, format!("min {}", significant(f64::from(least), 3)));
+        right(bar.bottom() + 10.0, tr!("max {}", significant(f64::from(most), 3)));
+        right(bar.bottom() + 24.0, tr!("min {}", significant(f64::from(least), 3)));
     }
 }
 

@@ -11,6 +11,7 @@ use intrados_stage::time::DAY;
 use crate::{
     chart::{key, place, plot},
     colours,
+    lang::fixed,
     number::significant,
 };
 
@@ -21,7 +22,7 @@ const TURN: [Color32; 4] =
 pub(super) fn show(ui: &mut Ui, skin: &Skin, shot: &Snapshot, analysis: &Analysis, height: f32) {
     let each = if skin.tendons.is_empty() { height - 50.0 } else { 0.5 * height - 50.0 }.max(60.0);
     if skin.tendons.is_empty() {
-        ui.weak("No tendons in this member.");
+        ui.weak(tr!("No tendons in this member."));
     } else {
         tendons(ui, skin, shot, each);
     }
@@ -31,14 +32,15 @@ pub(super) fn show(ui: &mut Ui, skin: &Skin, shot: &Snapshot, analysis: &Analysi
 /// Force along each tendon, and at the jack.
 fn tendons(ui: &mut Ui, skin: &Skin, shot: &Snapshot, height: f32) {
     ui.horizontal(|ui| {
-        ui.strong("Tendon force, kN").on_hover_text("Along the tendon from its first end, m");
-        ui.weak(format!("{} tendons", skin.tendons.len())).on_hover_text("Dashed: at the jack");
+        ui.strong(tr!("Tendon force, kN"))
+            .on_hover_text(tr!("Along the tendon from its first end, m"));
+        ui.weak(tr!("{} tendons", skin.tendons.len())).on_hover_text(tr!("Dashed: at the jack"));
     });
     let chart =
         plot("tendon forces").height(height).x_axis_label("m").include_y(0.0).label_formatter(
             |hover| {
                 let p = place(hover);
-                Some(format!("{} kN at {:.2} m", significant(p.y, 4), p.x))
+                Some(tr!("{} kN at {} m", significant(p.y, 4), fixed(p.x, 2)))
             },
         );
     chart.show(ui, |chart| {
@@ -52,7 +54,7 @@ fn tendons(ui: &mut Ui, skin: &Skin, shot: &Snapshot, height: f32) {
             let jack: PlotPoints<'_> =
                 ends.into_iter().map(|s| [s, 1e-3 * tendon.jacking]).collect();
             chart.line(
-                Line::new("at the jack", jack)
+                Line::new(tr!("at the jack"), jack)
                     .color(colour)
                     .width(1.0)
                     .style(egui_plot::LineStyle::dashed_dense()),
@@ -65,8 +67,8 @@ fn tendons(ui: &mut Ui, skin: &Skin, shot: &Snapshot, height: f32) {
 fn life(ui: &mut Ui, shot: &Snapshot, analysis: &Analysis, height: f32) {
     // No wider than the plot, which would follow.
     ui.horizontal_wrapped(|ui| {
-        key(ui, "displacement, mm", colours::PRIMAL, false);
-        key(ui, "widest crack, mm", colours::DUAL, false);
+        key(ui, &tr!("displacement, mm"), colours::PRIMAL, false);
+        key(ui, &tr!("widest crack, mm"), colours::DUAL, false);
     });
     let shots = analysis.seen.shots();
     let [largest, widest] = [0, 1].map(|k| move |s: &Snapshot| 1e3 * f64::from(s.largest[k]));
@@ -75,28 +77,28 @@ fn life(ui: &mut Ui, shot: &Snapshot, analysis: &Analysis, height: f32) {
     let at = |time: f64| (time / DAY).signum() * (time / DAY).abs().sqrt();
     let chart = plot("life")
         .height(height)
-        .x_axis_label("day (root scale)")
+        .x_axis_label(tr!("day (root scale)"))
         .include_y(0.0)
         .x_axis_formatter(|mark, _| significant(mark.value * mark.value.abs(), 2))
         .label_formatter(|hover| {
             let p = place(hover);
-            Some(format!("{} mm at day {}", significant(p.y, 3), significant(p.x * p.x.abs(), 3)))
+            Some(tr!("{} mm at day {}", significant(p.y, 3), significant(p.x * p.x.abs(), 3)))
         });
     chart.show(ui, |chart| {
         chart.line(
             Line::new(
-                "displacement",
+                tr!("displacement"),
                 shots.iter().map(|s| [at(s.time), largest(s)]).collect::<PlotPoints<'_>>(),
             )
             .color(colours::PRIMAL),
         );
         chart.line(
             Line::new(
-                "crack",
+                tr!("crack"),
                 shots.iter().map(|s| [at(s.time), widest(s)]).collect::<PlotPoints<'_>>(),
             )
             .color(colours::DUAL),
         );
-        chart.vline(VLine::new("now", at(shot.time)).color(colours::SELECTED).width(1.0));
+        chart.vline(VLine::new(tr!("now"), at(shot.time)).color(colours::SELECTED).width(1.0));
     });
 }

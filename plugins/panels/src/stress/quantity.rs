@@ -8,6 +8,8 @@ use intrados_mechanics::{
 };
 use rayon::prelude::*;
 
+use crate::lang::term;
+
 /// What is shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) enum Quantity {
@@ -39,21 +41,21 @@ impl Quantity {
         stresses.chain([Self::Damage, Self::Crack, Self::Displacement])
     }
 
-    pub(crate) fn name(self, skin: &Skin) -> &'static str {
+    pub(crate) fn name(self, skin: &Skin) -> String {
         match self {
-            Self::First => "Largest principal stress",
-            Self::Third => "Smallest principal stress",
-            Self::Mises => "Von Mises stress",
+            Self::First => tr!("Largest principal stress"),
+            Self::Third => tr!("Smallest principal stress"),
+            Self::Mises => tr!("Von Mises stress"),
             Self::Component(k) => {
-                (if skin.axis.is_some() { ROUND } else { PLAIN })[usize::from(k) % 6]
+                term((if skin.axis.is_some() { ROUND } else { PLAIN })[usize::from(k) % 6])
             }
-            Self::Damage => "Damage",
-            Self::Crack => "Crack width",
-            Self::Displacement => "Displacement",
+            Self::Damage => tr!("Damage"),
+            Self::Crack => tr!("Crack width"),
+            Self::Displacement => tr!("Displacement"),
         }
     }
 
-    /// Its unit, and what an SI value is multiplied by.
+    /// Its unit, a [`term`], and what an SI value is multiplied by.
     pub(crate) fn unit(self) -> (&'static str, f32) {
         match self {
             Self::Damage => ("0 sound … 1 broken", 1.0),

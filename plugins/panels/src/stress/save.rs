@@ -9,7 +9,7 @@ use intrados_mechanics::{
     write::csv,
 };
 
-use crate::export::write_png;
+use crate::{export::write_png, lang::fixed};
 
 /// What is written, by the ending of the file's name.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -42,8 +42,19 @@ pub(super) fn picture(
     Ok(format!("{}: {what}", path.display()))
 }
 
-/// Writes position, displacement, stress, damage and crack width of all points of the surface.
-pub(super) fn table(skin: &Skin, shot: &Snapshot, path: &Path) -> Result<String, String> {
+/// How many points of the surface there are.
+pub(super) fn points(skin: &Skin, shot: &Snapshot) -> usize {
+    skin.rest.len().min(shot.displacement.len())
+}
+
+/// Writes position, displacement, stress, damage and crack width of all points of the surface;
+/// `what` says how many and when.
+pub(super) fn table(
+    skin: &Skin,
+    shot: &Snapshot,
+    path: &Path,
+    what: &str,
+) -> Result<String, String> {
     let columns = [
         "x_m",
         "y_m",
@@ -60,7 +71,7 @@ pub(super) fn table(skin: &Skin, shot: &Snapshot, path: &Path) -> Result<String,
         "damage",
         "crack_width_m",
     ];
-    let rows: Vec<Vec<f64>> = (0..skin.rest.len().min(shot.displacement.len()))
+    let rows: Vec<Vec<f64>> = (0..points(skin, shot))
         .map(|v| {
             let place = skin.rest[v].to_array().into_iter().chain(shot.displacement[v].to_array());
             place
@@ -71,24 +82,21 @@ pub(super) fn table(skin: &Skin, shot: &Snapshot, path: &Path) -> Result<String,
         })
         .collect();
     csv(path, &columns, &rows).map_err(|e| e.to_string())?;
-    Ok(format!(
-        "{}: {} points of the surface at {}",
-        path.display(),
-        rows.len(),
-        super::moment(shot.time)
-    ))
+    Ok(format!("{}: {what}", path.display()))
 }
 
 /// One line on the whole life.
 pub(super) fn summary(outcome: &Outcome, part: &str) -> Option<String> {
     let m = outcome.members.iter().find(|m| m.name == part)?;
-    Some(format!(
-        "whole life: tension up to {:.2} MPa, compression {:.1} MPa, bars {:.0} MPa, damage {:.2} ({:.1} % of the volume above 0.5), cracks up to {:.2} mm",
-        m.peak_tension_pa / 1e6,
-        m.peak_compression_pa / 1e6,
-        m.peak_bar_stress_pa / 1e6,
-        m.max_damage,
-        100.0 * m.damaged_volume_fraction,
-        1e3 * m.max_crack_width_m
+    Some(tr!(
+        "whole life: tension up to {} MPa, compression {} MPa, bars {} MPa, \
+         damage {} ({} % of the volume above {}), cracks up to {} mm",
+        fixed(m.peak_tension_pa / 1e6, 2),
+        fixed(m.peak_compression_pa / 1e6, 1),
+        fixed(m.peak_bar_stress_pa / 1e6, 0),
+        fixed(m.max_damage, 2),
+        fixed(100.0 * m.damaged_volume_fraction, 1),
+        fixed(0.5, 1),
+        fixed(1e3 * m.max_crack_width_m, 2)
     ))
 }

@@ -4,6 +4,8 @@ use egui::{Align2, Color32, Rect, Ui, vec2};
 use glam::Vec3;
 use intrados_scene::Camera;
 
+use crate::lang::term;
+
 /// Length of an axis that lies in the picture, points.
 const ARM: f32 = 24.0;
 /// Axes with their names and colours, as all that draw models have them.
@@ -26,6 +28,6 @@ pub(super) fn draw(ui: &Ui, rect: Rect, camera: &Camera) {
         let way = vec2(way.dot(right), -way.dot(up));
         painter.line_segment([middle, middle + ARM * way], (2.0, ink));
         let at = middle + ARM * way + 8.0 * way.normalized();
-        painter.text(at, Align2::CENTER_CENTER, name, font.clone(), ink);
+        painter.text(at, Align2::CENTER_CENTER, term(name), font.clone(), ink);
     }
 }

@@ -4,7 +4,7 @@ use egui::{Align2, Color32, Rect, Ui, vec2};
 use glam::Vec3;
 use intrados_scene::Camera;
 
-use crate::{colours, surface::place};
+use crate::{colours, lang::fixed, surface::place};
 
 /// The tape, and the places that it lies between.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -30,8 +30,8 @@ impl Tape {
     pub(super) fn said(&self) -> String {
         match self.ends[..] {
             [a, b, ..] => reading(a, b),
-            [_] => "and to where? Click the other place.".into(),
-            [] => "Click the first place on a member.".into(),
+            [_] => tr!("and to where? Click the other place."),
+            [] => tr!("Click the first place on a member."),
         }
     }
 
@@ -62,17 +62,17 @@ impl Tape {
 fn reading(a: Vec3, b: Vec3) -> String {
     let d = b - a;
     let level = vec2(d.x, d.z).length();
-    format!("{} ({} level, {} upright)", length(d.length()), length(level), length(d.y.abs()))
+    tr!("{} ({} level, {} upright)", length(d.length()), length(level), length(d.y.abs()))
 }
 
 /// m, as it is read on a drawing: millimetres, from 10 m on centimetres.
 fn length(m: f32) -> String {
     if m < 1.0 {
-        format!("{:.0} mm", 1e3 * m)
+        format!("{} mm", fixed(1e3 * m, 0))
     } else if m < 10.0 {
-        format!("{m:.3} m")
+        format!("{} m", fixed(m, 3))
     } else {
-        format!("{m:.2} m")
+        format!("{} m", fixed(m, 2))
     }
 }
 

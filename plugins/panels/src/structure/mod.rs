@@ -4,7 +4,9 @@ mod compass;
 mod measure;
 mod model;
 mod section;
+mod settled;
 mod spot;
+mod time;
 
 use std::sync::Arc;
 
@@ -15,13 +17,15 @@ use intrados_scene::{Scene, plugin::CurrentScene};
 use measure::Tape;
 use model::Scale;
 use section::Section;
+use settled::{Light, Settling};
 pub(crate) use spot::Spot;
 
 use crate::{
     Action, Actions, Latest, Selection,
     attach::Form,
     history::{Earlier, History},
-    moment::{self, Moment, Seen},
+    lang::fixed,
+    moment::{Courses, Moment, Seen, Timeline},
 };
 
 /// Where the structure is looked at from.
@@ -35,12 +39,14 @@ pub(crate) enum View {
     Along(Vec3),
 }
 
-/// Sides, by their names and keys.
-const SIDES: [(&str, Vec3); 3] = [
-    ("Front", Vec3::new(0.0, 0.06, 1.0)),
-    ("Side", Vec3::new(1.0, 0.06, 0.0)),
-    ("Top", Vec3::new(0.0, 1.0, 0.02)),
-];
+/// Sides, by their names.
+fn sides() -> [(String, Vec3); 3] {
+    [
+        (tr!("Front|view"), Vec3::new(0.0, 0.06, 1.0)),
+        (tr!("Side|view"), Vec3::new(1.0, 0.06, 0.0)),
+        (tr!("Top|view"), Vec3::new(0.0, 1.0, 0.02)),
+    ]
+}
 
 /// What the panel remembers.
 #[derive(Resource)]
@@ -54,21 +60,37 @@ pub(crate) struct Structure {
     section: Option<Section>,
     tape: Tape,
     wished: Option<View>,
-    moment: Moment,
+    /// Whether it is shown as it looks, not by its damage.
+    is_lit: bool,
+    settling: Settling,
 }
 
 impl Default for Structure {
     fn default() -> Self {
         let (model, tape) = (model::Model::default(), Tape::default());
-        let moment = Moment::default();
         let earlier = model::Model::earlier();
-        Self { model, earlier, names: true, section: None, tape, wished: None, moment }
+        let (is_lit, settling) = (false, Settling::default());
+        Self {
+            model,
+            earlier,
+            names: true,
+            section: None,
+            tape,
+            wished: None,
+            is_lit,
+            settling,
+        }
     }
 }
 
 impl Structure {
     pub(crate) fn look(&mut self, view: View) {
         self.wished = Some(view);
+    }
+
+    /// Whether it shows the path-traced picture.
+    pub(crate) fn is_lit(&self) -> bool {
+        self.is_lit
     }
 
     /// The place on a member that is at a point of the window, while the picture is in sight.
@@ -88,7 +110,8 @@ impl Default for Preview {
 
 impl Preview {
     pub(crate) fn show(&mut self, ui: &mut Ui, rect: Rect, scene: &Arc<Scene>) {
-        self.0.show(ui, rect, scene, &[], Scale::DAMAGE, Selection(None), None);
+        let shown = self.0.show(ui, rect, scene, &[], Scale::DAMAGE, Selection(None), None);
+        shown.iter().for_each(|shown| model::ruler(ui, rect, &shown.camera));
     }
 }
 
@@ -99,6 +122,9 @@ pub(crate) fn structure(
     mut history: ResMut<History>,
     selection: Res<Selection>,
     mut structure: ResMut<Structure>,
+    courses: Res<Courses>,
+    mut moment: ResMut<Moment>,
+    mut light: Light<'_>,
     mut form: ResMut<Form>,
     mut actions: ResMut<Actions>,
 ) {
@@ -113,11 +139,15 @@ pub(crate) fn structure(
         structure.model.camera().iter().for_each(|camera| structure.earlier.follow(camera));
     }
     let section = structure.section;
-    // Of a prediction that is not there yet nothing is foretold.
-    let years = moment::years(scene, &latest);
-    let when = if years.is_some() { structure.moment } else { Moment::Now };
-    let seen = when.seen(scene, &latest);
-    let scale = if when == Moment::Added { Scale::ADDED } else { Scale::DAMAGE };
+    // What is cut open, or compared, is not as it looks.
+    let is_lit = structure.is_lit && section.is_none() && history.beside().is_none();
+    let when = *moment;
+    let seen = if is_lit { Vec::new() } else { when.seen(scene, &latest, &courses) };
+    let scale = match (is_lit, when.added && !when.is_now()) {
+        (true, _) => Scale::NONE,
+        (false, true) => Scale::ADDED,
+        (false, false) => Scale::DAMAGE,
+    };
     let rect = match history.beside() {
         None => whole,
         Some(earlier) => {
@@ -136,21 +166,28 @@ pub(crate) fn structure(
     };
     let pointed = structure.model.show(ui, rect, scene, &seen, scale, *selection, section);
     let Some(pointed) = pointed else { return };
+    if is_lit {
+        structure.settling.show(ui, rect, &pointed.camera, &mut light);
+    }
+    model::ruler(ui, rect, &pointed.camera);
     if structure.names {
-        let value = |i: usize| match when {
-            Moment::Now => latest.member(i).map(|p| p.damage.value),
-            Moment::Ahead | Moment::Added => seen.get(i).and_then(Seen::most),
+        let value = |i: usize| match when.is_now() {
+            true => latest.member(i).map(|p| p.damage.value),
+            false => seen.get(i).and_then(Seen::most),
         };
         structure.model.names(ui, rect, scene, &value, *selection, &pointed.camera);
     }
     structure.earlier.follow(&pointed.camera);
     compass::draw(ui, rect, &pointed.camera);
     structure.tape.draw(ui, rect, &pointed.camera);
-    let shown = Shown { latest: &latest, seen: &seen, when, years };
+    let shown = Shown { latest: &latest, seen: &seen, when };
     point(structure, scene, &shown, pointed, form.bypass_change_detection(), &mut actions);
     let bar = Rect::from_min_size(whole.min + vec2(8.0, 8.0), vec2(whole.width() - 16.0, 24.0));
     ui.scope_builder(egui::UiBuilder::new().max_rect(bar), |ui| {
-        ui.vertical(|ui| tools(ui, structure, history, *selection, years, &mut actions));
+        ui.vertical(|ui| {
+            let timeline = &courses.timeline;
+            tools(ui, structure, history, *selection, (&mut moment, timeline), &mut actions);
+        });
     });
 }
 
@@ -167,6 +204,7 @@ fn beside(
     let (seen, section) = (earlier.seen(scene), structure.section);
     let shown = structure.earlier.show(ui, rect, scene, &seen, Scale::DAMAGE, selection, section);
     let Some(pointed) = shown else { return };
+    model::ruler(ui, rect, &pointed.camera);
     structure.model.follow(&pointed.camera);
     if structure.names {
         let value = |i: usize| earlier.member(&scene.members[i].id)?.damage().map(|d| d.value);
@@ -192,18 +230,18 @@ struct Shown<'a> {
     latest: &'a Latest,
     seen: &'a [Seen],
     when: Moment,
-    years: Option<f64>,
 }
 
 impl Shown<'_> {
     /// What is to be said of a place beside how it is now.
     fn later(&self, spot: &Spot) -> String {
         let value = self.seen.get(spot.member).and_then(|s| s.zones[spot.zone]);
-        let (Some(value), Some(years)) = (value, self.years) else { return String::new() };
-        match self.when {
-            Moment::Now => String::new(),
-            Moment::Ahead => format!("In {years:.0} years: d = {value:.2} at least"),
-            Moment::Added => format!("{years:.0} years add {value:.2}, by the forecast"),
+        let Some(value) = value.filter(|_| !self.when.is_now()) else { return String::new() };
+        let (years, value) = (self.when.years, fixed(value, 2));
+        match self.when.added {
+            _ if years < 0.0 => tr!("{} years ago: d = {}, by its life", fixed(-years, 1), value),
+            false => tr!("In {} years: d = {} at least", fixed(years, 1), value),
+            true => tr!("{} years add {}, by the forecast", fixed(years, 1), value),
         }
     }
 }
@@ -248,30 +286,37 @@ fn tools(
     structure: &mut Structure,
     history: &mut History,
     selection: Selection,
-    years: Option<f64>,
+    (moment, timeline): (&mut ResMut<Moment>, &Timeline),
     actions: &mut Actions,
 ) {
     let frame = egui::Frame::popup(ui.style()).inner_margin(4);
     frame.show(ui, |ui| {
         ui.horizontal(|ui| {
             views(ui, structure, selection, actions);
-            ui.toggle_value(&mut structure.names, "Names")
-                .on_hover_text("Name and damage of every member, the worst first");
+            ui.toggle_value(&mut structure.names, tr!("Names"))
+                .on_hover_text(tr!("Name and damage of every member, the worst first"));
             let mut is_cut = structure.section.is_some();
-            let hint = "Cuts it open, through the middle of the selected member";
-            if ui.toggle_value(&mut is_cut, "Section").on_hover_text(hint).changed() {
+            let hint = tr!("Cuts it open, through the middle of the selected member");
+            if ui.toggle_value(&mut is_cut, tr!("Section")).on_hover_text(hint).changed() {
                 structure.section = is_cut.then(|| structure.model.section(selection.0));
             }
-            let hint = "The distance between two places that are clicked";
-            let tape = ui.toggle_value(&mut structure.tape.is_on, "Measure");
+            let hint = tr!("The distance between two places that are clicked");
+            let tape = ui.toggle_value(&mut structure.tape.is_on, tr!("Measure"));
             if tape.on_hover_text(hint).changed() {
                 structure.tape.clear();
             }
             compared(ui, history, actions);
+            let hint = tr!("Light, as an eye would see it, path-traced once nobody moves it");
+            let lit = ui.toggle_value(&mut structure.is_lit, tr!("As it looks"));
+            if lit.on_hover_text(hint).changed() {
+                structure.settling = Settling::default();
+            }
         });
     });
-    if let Some(years) = years {
-        frame.show(ui, |ui| ui.horizontal(|ui| moments(ui, &mut structure.moment, years)));
+    if timeline.range().is_some() {
+        let mut when = **moment;
+        frame.show(ui, |ui| ui.horizontal(|ui| time::bar(ui, &mut when, timeline)));
+        moment.set_if_neq(when);
     }
     let bounds = structure.model.bounds();
     if let Some(section) = &mut structure.section {
@@ -281,7 +326,7 @@ fn tools(
         frame.show(ui, |ui| {
             ui.horizontal(|ui| {
                 ui.label(structure.tape.said());
-                if ui.button("Clear the tape").clicked() {
+                if ui.button(tr!("Clear the tape")).clicked() {
                     structure.tape.clear();
                 }
             })
@@ -292,44 +337,33 @@ fn tools(
 /// Which earlier prediction is looked at beside the newest.
 fn compared(ui: &mut Ui, history: &mut History, actions: &mut Actions) {
     let mut chosen = history.chosen();
-    let button = ui.menu_button("Compare", |ui| {
-        ui.selectable_value(&mut chosen, None, "Nothing");
+    let button = ui.menu_button(tr!("Compare"), |ui| {
+        ui.selectable_value(&mut chosen, None, tr!("Nothing"));
         for (index, title) in history.titles().enumerate() {
             ui.selectable_value(&mut chosen, Some(index), title);
         }
         ui.separator();
-        if ui.button("Open an earlier prediction…").clicked() {
+        if ui.button(tr!("Open an earlier prediction…")).clicked() {
             actions.ask(Action::ChoosePrediction);
         }
     });
-    let hint = "An earlier prediction beside this one: of before a change, or the predict.json of another day";
+    let hint = tr!("An earlier prediction beside this one: of before a change, \
+         or the predict.json of another day");
     button.response.on_hover_text(hint);
     history.choose(chosen);
 }
 
-/// When it is looked at.
-fn moments(ui: &mut Ui, moment: &mut Moment, years: f64) {
-    let hint = "Damage as it is known now";
-    ui.selectable_value(moment, Moment::Now, "Now").on_hover_text(hint);
-    let hint = "What is known now, and more where the forecast says more. Only the end of the forecast was computed: there is nothing between.";
-    let ahead = format!("In {years:.0} years");
-    ui.selectable_value(moment, Moment::Ahead, ahead).on_hover_text(hint);
-    let hint = "Damage at the end of the forecast less that of now, both by the forecast";
-    let added = format!("What {years:.0} years add");
-    ui.selectable_value(moment, Moment::Added, added).on_hover_text(hint);
-}
-
 fn views(ui: &mut Ui, structure: &mut Structure, selection: Selection, actions: &mut Actions) {
-    let all = ui.button("All").on_hover_text("The whole structure (Home)");
+    let all = ui.button(tr!("All")).on_hover_text(tr!("The whole structure (Home)"));
     if all.clicked() {
         actions.ask(Action::Home);
     }
-    let hint = "The selected member fills the picture (F)";
-    let member = ui.add_enabled(selection.0.is_some(), egui::Button::new("Selected"));
+    let hint = tr!("The selected member fills the picture (F)");
+    let member = ui.add_enabled(selection.0.is_some(), egui::Button::new(tr!("Selected")));
     if member.on_hover_text(hint).clicked() {
         actions.ask(Action::Frame);
     }
-    for (name, axis) in SIDES {
+    for (name, axis) in sides() {
         if ui.button(name).clicked() {
             structure.look(View::Along(axis));
         }

@@ -4,7 +4,6 @@ use std::sync::Arc;
 
 use egui::{Align2, Color32, Rect, Sense, TextureHandle, TextureOptions, Ui, pos2, vec2};
 use glam::Vec3;
-use intrados_damage::zone::place as place_of;
 use intrados_report::surface::{Facet, facets};
 use intrados_scene::{Camera, Scene};
 use rayon::prelude::*;
@@ -12,7 +11,8 @@ use rayon::prelude::*;
 use super::{section::Section, spot::Spot};
 use crate::{
     Latest, Selection, colours,
-    moment::Seen,
+    lang::{fixed, local, term},
+    moment::{Seen, place as place_of},
     number::plus_minus,
     surface::{Drawn, Surface, bounds, draw, hand, place},
 };
@@ -38,6 +38,7 @@ const LEGEND: f32 = 92.0;
 /// What colours mean.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Scale {
+    /// A [`term`].
     pub(super) name: &'static str,
     /// The value of the last colour.
     pub(super) top: f64,
@@ -46,6 +47,8 @@ pub(super) struct Scale {
 impl Scale {
     /// Of damage as it is.
     pub(super) const DAMAGE: Self = Self { name: "damage d", top: 1.0 };
+    /// Of what is not shown by its damage.
+    pub(super) const NONE: Self = Self { name: "", top: 1.0 };
     /// Of what years add, which is less.
     pub(super) const ADDED: Self = Self { name: "d is added", top: 0.4 };
 }
@@ -129,7 +132,7 @@ impl Model {
         ui.painter().rect_filled(rect, 0.0, ground(ui));
         if self.facets.is_empty() {
             let font = egui::TextStyle::Body.resolve(ui.style());
-            let text = "No member of this scene has a surface.";
+            let text = tr!("No member of this scene has a surface.");
             let ink = ui.visuals().weak_text_color();
             ui.painter().text(rect.center(), Align2::CENTER_CENTER, text, font, ink);
             return None;
@@ -138,9 +141,9 @@ impl Model {
         let response = ui.allocate_rect(rect, Sense::click_and_drag());
         response.widget_info(|| {
             let name = match self.of_what {
-                Of::Now => "Damage of members",
-                Of::Earlier => "Damage of members in an earlier prediction",
-                Of::Bare => "Preview",
+                Of::Now => tr!("Damage of members"),
+                Of::Earlier => tr!("Damage of members in an earlier prediction"),
+                Of::Bare => tr!("Preview"),
             };
             egui::WidgetInfo::labeled(egui::Role::Image, true, name)
         });
@@ -156,10 +159,9 @@ impl Model {
         let shown = self.shown.as_ref()?;
         let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
         ui.painter().image(shown.texture.id(), rect, whole, Color32::WHITE);
-        if self.of_what == Of::Now {
+        if self.of_what == Of::Now && scale != Scale::NONE {
             legend(ui, rect, scale);
         }
-        ruler(ui, rect, &camera);
         let under = response.hover_pos().and_then(|at| shown.spot(at));
         Some(Pointed { response, under, camera })
     }
@@ -244,7 +246,7 @@ impl Model {
             let Some(middle) = self.middle(index) else { continue };
             let at = place(camera, rect, middle);
             let text = match value(index) {
-                Some(d) => format!("{}  {d:.2}", scene.members[index].name),
+                Some(d) => format!("{}  {}", scene.members[index].name, fixed(d, 2)),
                 None => format!("{}  ?", scene.members[index].name),
             };
             let ink = Color32::from_gray(245);
@@ -477,13 +479,11 @@ pub(super) fn said(ui: &mut Ui, scene: &Scene, latest: &Latest, spot: &Spot, lat
     match zone {
         Some(r) => {
             let basis = latest.member(spot.member).map_or("", |p| p.basis[spot.zone].name());
-            ui.label(format!(
-                "{} of the axis: d = {}, {basis}",
-                place_of(spot.zone),
-                plus_minus(r.value, r.std_error, "")
-            ))
+            let damage = plus_minus(r.value, r.std_error, "");
+            let (zone, basis) = (place_of(spot.zone), term(basis));
+            ui.label(tr!("{} of the axis: d = {}, {}", zone, damage.trim(), basis))
         }
-        None => ui.weak("Nothing is known of it yet; that is not the same as sound."),
+        None => ui.weak(tr!("Nothing is known of it yet; that is not the same as sound.")),
     };
     if !later.is_empty() {
         ui.label(later);
@@ -491,7 +491,7 @@ pub(super) fn said(ui: &mut Ui, scene: &Scene, latest: &Latest, spot: &Spot, lat
 }
 
 /// A length in the picture, at the distance of its middle: nearer things are larger.
-fn ruler(ui: &Ui, rect: Rect, camera: &Camera) {
+pub(super) fn ruler(ui: &Ui, rect: Rect, camera: &Camera) {
     let distance = (camera.target - camera.position).length();
     let width = 2.0 * camera.half_extent()[0] * distance;
     let metre = rect.width() / width.max(1e-6);
@@ -501,9 +501,9 @@ fn ruler(ui: &Ui, rect: Rect, camera: &Camera) {
     let length = [5.0, 2.0, 1.0].map(|k| k * power).into_iter().find(|l| *l <= most);
     let Some(length) = length.filter(|l| l.is_finite()) else { return };
     let text = if length < 1.0 {
-        format!("{:.0} mm at the middle", 1e3 * length)
+        tr!("{} mm at the middle", fixed(1e3 * length, 0))
     } else {
-        format!("{length:.0} m at the middle")
+        tr!("{} m at the middle", fixed(length, 0))
     };
     let ink = ui.visuals().text_color();
     let left = rect.left_bottom() + vec2(14.0, -14.0);
@@ -545,21 +545,21 @@ pub(super) fn legend(ui: &Ui, rect: Rect, scale: Scale) {
         let at = pos2(bar.right() + 5.0, y(tick));
         let is_whole = scale.top >= 1.0;
         let word = match tick {
-            0.0 if is_whole => "0 sound".to_owned(),
-            1.0 if is_whole => "1 lost".to_owned(),
-            1.0 => format!("{} or more", scale.top),
-            _ => format!("{}", f64::from(tick) * scale.top),
+            0.0 if is_whole => tr!("0 sound"),
+            1.0 if is_whole => tr!("1 lost"),
+            1.0 => tr!("{} or more", local(scale.top.to_string())),
+            _ => fixed(f64::from(tick) * scale.top, 2),
         };
         write(at, Align2::LEFT_CENTER, &word);
     }
-    write(back.min + vec2(8.0, 6.0), Align2::LEFT_TOP, scale.name);
+    write(back.min + vec2(8.0, 6.0), Align2::LEFT_TOP, &term(scale.name));
     let mut patch = Rect::from_min_size(bar.left_bottom() + vec2(0.0, 10.0), vec2(14.0, 10.0));
     for (colour, word) in [
-        (colours::damage_ink(f32::NAN, false), "unknown"),
-        (colours::damage_ink(0.25, true), "forecast"),
+        (colours::damage_ink(f32::NAN, false), tr!("unknown")),
+        (colours::damage_ink(0.25, true), tr!("forecast|legend")),
     ] {
         painter.rect_filled(patch, 0.0, colour);
-        write(patch.right_center() + vec2(5.0, 0.0), Align2::LEFT_CENTER, word);
+        write(patch.right_center() + vec2(5.0, 0.0), Align2::LEFT_CENTER, &word);
         patch = patch.translate(vec2(0.0, 15.0));
     }
 }

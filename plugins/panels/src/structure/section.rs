@@ -4,6 +4,8 @@ use egui::{Slider, Ui};
 use glam::Vec3;
 use intrados_report::surface::Facet;
 
+use crate::lang::term;
+
 /// Directions that planes may be across, by what an engineer calls them.
 const AXES: [(&str, Vec3); 3] = [("x", Vec3::X), ("height", Vec3::Y), ("z", Vec3::Z)];
 
@@ -46,22 +48,22 @@ impl Section {
 
     /// Its row of tools.
     pub(super) fn tools(&mut self, ui: &mut Ui, bounds: [Vec3; 2]) {
-        ui.label("Cut across");
+        ui.label(tr!("Cut across"));
         for (index, (name, _)) in AXES.iter().enumerate() {
-            if ui.selectable_value(&mut self.axis, index, *name).changed() {
+            if ui.selectable_value(&mut self.axis, index, term(name)).changed() {
                 self.share = 0.5;
             }
         }
-        let label = ui.label("at");
+        let label = ui.label(tr!("at|cut"));
         let axis = self.normal();
         let [from, to] = bounds.map(|b| b.dot(axis));
         let mut level = self.level(bounds);
         ui.spacing_mut().slider_width = 110.0;
-        let slider = Slider::new(&mut level, from..=to).suffix(" m").max_decimals(2);
+        let slider = lang::slide(&mut level, from..=to).suffix(" m").max_decimals(2);
         if ui.add(slider).labelled_by(label.id).changed() && to > from {
             self.share = ((level - from) / (to - from)).clamp(0.0, 1.0);
         }
-        if ui.button("Other side").clicked() {
+        if ui.button(tr!("Other side")).clicked() {
             self.keeps_far = !self.keeps_far;
         }
     }
