@@ -208,6 +208,9 @@ pub(crate) struct Screenshot {
     /// Colours of the window
     #[arg(long, value_enum, default_value_t = WindowTheme::Dark)]
     pub(crate) theme: WindowTheme,
+    /// What the window speaks
+    #[arg(long, value_enum, default_value_t = WindowLanguage::En)]
+    pub(crate) language: WindowLanguage,
     /// Longest to wait for the prediction, seconds; then the window is taken as it is
     #[arg(long, value_name = "SECONDS", default_value_t = 300)]
     pub(crate) wait: u64,
@@ -230,6 +233,17 @@ pub(crate) enum WindowLayout {
 pub(crate) enum WindowTheme {
     Light,
     Dark,
+}
+
+/// See [`Screenshot::language`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum WindowLanguage {
+    /// English
+    En,
+    /// German
+    De,
+    /// Chinese
+    Zh,
 }
 
 fn window_size(text: &str) -> Result<[u32; 2], String> {

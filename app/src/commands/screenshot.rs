@@ -17,7 +17,7 @@ pub(crate) fn run(session: &Session, args: &args::Screenshot) -> Result<Outcome,
 fn take(session: &Session, args: &args::Screenshot) -> Result<Outcome, Failure> {
     use std::time::Duration;
 
-    use intrados_panels::{Action, PanelsPlugin, Workspace};
+    use intrados_panels::{Action, Language, PanelsPlugin, Workspace};
 
     use crate::desktop::{Shot, take_shot};
 
@@ -42,8 +42,14 @@ fn take(session: &Session, args: &args::Screenshot) -> Result<Outcome, Failure> 
         out: args.out.clone(),
     };
     // Nothing of how the user has arranged his own window is in it, and nothing of it is changed.
+    let language = match args.language {
+        args::WindowLanguage::En => Language::English,
+        args::WindowLanguage::De => Language::German,
+        args::WindowLanguage::Zh => Language::Chinese,
+    };
+    let (recent, layout, session_file) = (None, None, None);
     let panels =
-        PanelsPlugin { recent: None, layout: None, session: None, ..PanelsPlugin::desktop() };
+        PanelsPlugin { recent, layout, session: session_file, language, ..PanelsPlugin::desktop() };
     take_shot(super::view::builder(session, panels), shot)
         .map_err(|e| Failure::Internal(format!("no picture: {e:#}")))?;
     Ok(Outcome::Done)

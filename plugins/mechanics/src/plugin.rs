@@ -179,8 +179,7 @@ fn take(
             continue;
         }
         let Work::Done(life) = &analysis.work else { continue };
-        let (end, then) =
-            (life.damage(f64::INFINITY), life.damage(at.0.unwrap_or(f64::INFINITY)));
+        let (end, then) = (life.damage(f64::INFINITY), life.damage(at.0.unwrap_or(f64::INFINITY)));
         for (entity, member, before) in &members {
             let of = |all: &[SurfaceDamage]| all.iter().find(|d| d.member == member.id).cloned();
             let Some(last) = of(end) else { continue };

@@ -32,7 +32,7 @@ impl Banners {
         let problems: Vec<String> = error.problems().iter().map(ToString::to_string).collect();
         self.put(Banner {
             title: tr!("Not opened"),
-            text: error.to_string(),
+            text: term(&error.to_string()),
             details: problems.join("\n"),
             reload: false,
         });
@@ -42,7 +42,7 @@ impl Banners {
     pub(crate) fn cannot(&mut self, title: &str, why: &str) {
         self.put(Banner {
             title: title.into(),
-            text: why.into(),
+            text: term(why),
             details: format!("{title}: {why}"),
             reload: false,
         });

@@ -8,7 +8,12 @@ use egui::{Button, ScrollArea, TextEdit, Ui, vec2};
 use intrados_scene::attach::{Draft, Setting};
 use intrados_stage::{Jobs, Task};
 
-use crate::{Action, Actions, lang::fixed, structure::Preview, values::Values};
+use crate::{
+    Action, Actions,
+    lang::{fixed, term},
+    structure::Preview,
+    values::Values,
+};
 
 /// What it takes of the window at most, points.
 const SIZE: (f32, f32) = (860.0, 560.0);
@@ -180,7 +185,7 @@ fn send(ui: &mut Ui, creation: &mut Creation, jobs: &mut Jobs) {
             creation.is_open = false;
         }
         if !creation.why.is_empty() {
-            ui.label(format!("⚠ {}", creation.why));
+            ui.label(format!("⚠ {}", term(&creation.why)));
         } else if is_there {
             ui.label(tr!("⚠ This folder is there already: choose another."));
         } else if let Some(draft) = &creation.draft {

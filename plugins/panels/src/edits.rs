@@ -16,7 +16,7 @@ use intrados_scene::{
 };
 use intrados_stage::{Access, Job, Jobs, Task};
 
-use crate::{Banners, Log, toast::Toasts};
+use crate::{Banners, Log, lang::term, toast::Toasts};
 
 /// So many changes can be taken back.
 const MOST: usize = 64;
@@ -221,7 +221,7 @@ pub(crate) fn take(
                 Some(named) => edits.taken_back.push(named),
                 None => {}
             }
-            log.say(tr!("nothing was changed: {}", why));
+            log.say(tr!("nothing was changed: {}", term(&why.to_string())));
             banners.cannot(&tr!("Nothing was changed"), &why);
             return;
         }

@@ -211,7 +211,7 @@ pub(crate) fn take(mut export: ResMut<Export>, mut log: ResMut<Log>) {
     let Some(done) = Task::take(&mut export.task) else { return };
     match done {
         Ok(Ok(what)) => log.say(tr!("wrote {}", what)),
-        Ok(Err(error)) => log.say(tr!("the picture was not written: {}", error)),
+        Ok(Err(error)) => log.say(tr!("the picture was not written: {}", term(&error.to_string()))),
         Err(_) => log.say(tr!("the picture was not written: the writer broke off")),
     }
 }

@@ -113,6 +113,11 @@ pub(crate) fn term(text: &str) -> String {
     filled(translated(pattern), &values)
 }
 
+/// What an engine says, several lines of it.
+pub(crate) fn lines<'a>(texts: impl IntoIterator<Item = &'a String>) -> String {
+    texts.into_iter().map(|text| term(text)).collect::<Vec<_>>().join("\n")
+}
+
 /// Terms with values in them, those that say most first.
 fn patterns() -> &'static [String] {
     static PATTERNS: OnceLock<Vec<String>> = OnceLock::new();
@@ -261,8 +266,9 @@ mod tests {
         for page in all.iter().filter(|p| !p.ends_with("lang.rs")) {
             let code = std::fs::read_to_string(page).unwrap();
             let code = code.split("#[cfg(test)]\nmod tests {").next().unwrap();
-            for call in code.split("tr!(").skip(1) {
-                let call = call.trim_start();
+            let is_word = |at: usize| code[..at].ends_with(char::is_alphanumeric);
+            for (at, _) in code.match_indices("tr!(").filter(|(at, _)| !is_word(*at)) {
+                let call = code[at + 4..].trim_start();
                 assert!(call.starts_with('"'), "{}: tr! of no literal: {call:.40}", page.display());
                 said.insert(literal(&call[1..]));
             }

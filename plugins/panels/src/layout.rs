@@ -101,7 +101,7 @@ pub(crate) fn greet(
         if *error == LoadError::Cancelled {
             log.say(tr!("opening was cancelled"));
         } else {
-            log.say(tr!("not opened: {}", error));
+            log.say(tr!("not opened: {}", term(&error.to_string())));
             banners.not_opened(error);
         }
     }
@@ -136,7 +136,7 @@ pub(crate) fn greet(
         fixed(size.z, 2)
     ));
     for warning in &scene.warnings {
-        log.say(format!("⚠ {warning}"));
+        log.say(format!("⚠ {}", term(warning)));
     }
 }
 
@@ -340,7 +340,7 @@ fn menu(ui: &mut Ui, world: &mut World) {
                 ui.strong(&scene.name).on_hover_text(scene.path.display().to_string());
                 if !scene.warnings.is_empty() {
                     ui.label(format!("⚠ {}", scene.warnings.len()))
-                        .on_hover_text(scene.warnings.join("\n"));
+                        .on_hover_text(lang::lines(&scene.warnings));
                 }
                 let expert = command::is_expert(world);
                 let hint = tr!("Estimators, light meters, fields and convergence (F9)");
@@ -404,11 +404,20 @@ fn arrangement(ui: &mut Ui, world: &World, asked: &mut Vec<Action>) {
     }
     ui.menu_button(tr!("Language"), |ui| {
         for language in Language::ALL {
-            if ui.radio(lang::spoken() == language, language.name()).clicked() {
+            let can = language != Language::Chinese || writes(ui, language.name());
+            let name = if can { language.name().to_owned() } else { tr!("Chinese") };
+            let choice = egui::RadioButton::new(lang::spoken() == language, name);
+            let why = tr!("No font with Chinese characters was found on this system");
+            if ui.add_enabled(can, choice).on_disabled_hover_text(why).clicked() {
                 asked.push(Action::Speak(language));
             }
         }
     });
+}
+
+/// Whether there is a font for this: the system's are sought for what egui's own have not.
+fn writes(ui: &Ui, text: &str) -> bool {
+    ui.ctx().fonts_mut(|fonts| fonts.has_glyphs(&egui::FontId::default(), text))
 }
 
 /// What lies on top.

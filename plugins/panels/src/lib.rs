@@ -69,4 +69,4 @@ pub use saving::Taken;
 pub use statistics::Statistics;
 pub use viewpoint::Viewpoint;
 pub use window::Window;
-pub use workspace::{SystemLanguage, Workspace};
+pub use workspace::Workspace;

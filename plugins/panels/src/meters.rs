@@ -6,7 +6,7 @@ use intrados_light::{MeterReading, SideReading};
 
 use crate::{
     Statistics,
-    lang::local,
+    lang::{local, term},
     number::{percent, plus_minus},
     steering::side_name,
 };
@@ -33,7 +33,7 @@ fn rows(ui: &mut Ui, reading: &MeterReading) {
         let text = if side.converged {
             String::new()
         } else {
-            tr!("The error bar may not be trusted yet: {}", side.complaint)
+            tr!("The error bar may not be trusted yet: {}", term(&side.complaint))
         };
         let mark = if side.converged { "" } else { " ⚠" };
         let label = ui.label(format!("{}{mark}", plus_minus(side.mean, side.std_error, &unit)));
@@ -50,7 +50,7 @@ fn rows(ui: &mut Ui, reading: &MeterReading) {
     let trust = if combined.converged {
         String::new()
     } else {
-        tr!("; the error bar may not be trusted yet: {}", combined.complaint)
+        tr!("; the error bar may not be trusted yet: {}", term(&combined.complaint))
     };
     ui.label(format!("{}{mark}", plus_minus(combined.mean, combined.std_error, &unit)))
         .on_hover_text(tr!(

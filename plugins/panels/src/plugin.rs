@@ -7,11 +7,11 @@ use bevy_ecs::prelude::*;
 use intrados_stage::Stage;
 
 use crate::{
-    Actions, AddPanel, Banners, Latest, Log, Look, Place, Refine, Selection, Statistics, Viewpoint,
-    action, attach, banner, command, convergence, create, ct, dialog, directions, drops, edits,
-    export, fields, history, inspector, layout, log, members, meters, outline, photos, picture,
-    place::Panels, prediction, recent, refine, render, report, saving, session, sheet, statistics,
-    steering, stress, structure, toast, viewpoint, workspace,
+    Actions, AddPanel, Banners, Language, Latest, Log, Look, Place, Refine, Selection, Statistics,
+    Viewpoint, action, attach, banner, command, convergence, create, ct, dialog, directions, drops,
+    edits, export, fields, history, inspector, layout, log, members, meters, moment, outline,
+    photos, picture, place::Panels, prediction, recent, refine, render, report, saving, session,
+    sheet, statistics, steering, stress, structure, toast, viewpoint, workspace,
 };
 
 /// Adds the window's state and the built-in panels. It opens no window: whoever has one calls
@@ -29,16 +29,20 @@ pub struct PanelsPlugin {
     pub session: Option<PathBuf>,
     /// Whether the system's file dialogs may be opened.
     pub dialogs: bool,
+    /// What the window speaks until its user chooses.
+    pub language: Language,
 }
 
 impl PanelsPlugin {
     /// As on a desktop: 8 ms a frame and what the last step takes beyond, recent files in the
-    /// user's data folder.
+    /// user's data folder, the system's language.
     #[must_use]
     pub fn desktop() -> Self {
         let file = |name| dirs::data_dir().map(|d| d.join("intrados").join(name));
         let [recent, layout, session] = ["recent.json", "layout.json", "session.json"].map(file);
-        Self { slice: Some(Duration::from_millis(8)), recent, layout, session, dialogs: true }
+        let language = sys_locale::get_locale().map_or(Language::English, |tag| Language::of(&tag));
+        let slice = Some(Duration::from_millis(8));
+        Self { slice, recent, layout, session, dialogs: true, language }
     }
 }
 
@@ -47,7 +51,7 @@ impl Plugin for PanelsPlugin {
         app.init_resource::<Panels>()
             .init_resource::<Actions>()
             .init_resource::<Selection>()
-            .init_resource::<workspace::SystemLanguage>()
+            .insert_resource(workspace::SystemLanguage(self.language))
             .init_resource::<Look>()
             .init_resource::<Viewpoint>()
             .init_resource::<Statistics>()

@@ -9,7 +9,7 @@ use intrados_light::{
 };
 use intrados_stage::Pace;
 
-use crate::{Look, Statistics, Viewpoint, Workspace, structure::Structure, workspace::Desk};
+use crate::{Look, Statistics, Viewpoint, Workspace, workspace::Desk};
 
 /// Pause, target error and time spent.
 #[derive(Resource, Debug, Clone)]
@@ -50,12 +50,12 @@ pub(crate) fn share_frame(
     refine: Res<Refine>,
     desk: Res<Desk>,
     statistics: Res<Statistics>,
-    viewpoint: Res<Viewpoint>,
+    mut viewpoint: ResMut<Viewpoint>,
     look: Res<Look>,
-    structure: Res<Structure>,
     mut pace: ResMut<Pace>,
 ) {
-    let is_seen = desk.has_drawn("Render") || structure.is_lit() && desk.has_drawn("Structure");
+    let is_seen = std::mem::take(&mut viewpoint.bypass_change_detection().is_seen)
+        || desk.has_drawn("Render");
     let is_hidden = desk.shown() == Workspace::Inspector && !is_seen;
     let rest =
         refine.paused || is_hidden || !viewpoint.is_preview() && refine.is_there(&statistics);

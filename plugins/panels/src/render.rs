@@ -304,7 +304,7 @@ fn status(
         });
         if !there && now.error() <= refine.target {
             ui.label(tr!("target reached, but by an error bar that may not be trusted"))
-                .on_hover_text(now.trust.words());
+                .on_hover_text(term(&now.trust.words()));
         } else if !there && now.error().is_finite() {
             let left = duration(refine.seconds_left(now.error()));
             ui.label(tr!("target in {}", left)).on_hover_text(tr!(
@@ -352,10 +352,10 @@ fn convergence(ui: &mut Ui, trust: &Trust) {
              side has met no light that is missing: the error bar may be trusted"
         ));
     } else if trust.is_settled() {
-        ui.label(tr!("Converged, not checked")).on_hover_text(trust.words());
+        ui.label(tr!("Converged, not checked")).on_hover_text(term(&trust.words()));
     } else {
         ui.label(tr!("⚠ Not converged"))
-            .on_hover_text(tr!("The error bar may be too small: {}", trust.words()));
+            .on_hover_text(tr!("The error bar may be too small: {}", term(&trust.words())));
     }
 }
 

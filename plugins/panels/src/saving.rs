@@ -284,7 +284,7 @@ pub(crate) fn take(
             log.say(tr!("saved {}", what));
         }
         Ok(Err(why)) => {
-            log.say(tr!("⚠ not saved: {}", why));
+            log.say(tr!("⚠ not saved: {}", term(&why.to_string())));
             banners.cannot(&tr!("Not saved"), &why);
         }
         // What a panic said is told with all others.

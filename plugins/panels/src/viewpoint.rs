@@ -26,6 +26,8 @@ pub struct Viewpoint {
     moved: bool,
     /// Whether a button is held and more is to come.
     pub(crate) dragged: bool,
+    /// Whether another panel than the Render tab has shown its picture since the last frame.
+    pub(crate) is_seen: bool,
     /// The small film is in use; what [`RenderSettings`] had for sides before.
     preview: Option<Sides>,
     /// The large film has been asked for and is not there yet.

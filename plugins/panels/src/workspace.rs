@@ -35,7 +35,7 @@ const SHEET: (f32, f32, f32) = (322.0, 0.25, 0.36);
 
 /// The language of the window where nobody has chosen one: the system's, as far as the app knows it.
 #[derive(Resource, Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct SystemLanguage(pub Language);
+pub(crate) struct SystemLanguage(pub(crate) Language);
 
 /// Two ways to arrange the window.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]

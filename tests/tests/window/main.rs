@@ -2,6 +2,7 @@
 
 mod forms;
 mod journey;
+mod languages;
 mod painter;
 mod pictures;
 mod tools;

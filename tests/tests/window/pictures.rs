@@ -48,7 +48,7 @@ fn compare(name: &str, picture: &RgbImage, wrong: &mut Vec<String>) {
 }
 
 /// A window at rest, opened on a column of which a crack has been seen.
-fn at_rest() -> (Window, tempfile::TempDir) {
+pub(super) fn at_rest() -> (Window, tempfile::TempDir) {
     let (mut window, folder) = with_seen();
     window.with(|w| w.resource_mut::<Refine>().paused = true);
     window.until("the prediction", |w| {

@@ -3,12 +3,15 @@
 use std::{fs, path::Path};
 
 use egui_kittest::kittest::{NodeT, Queryable};
-use intrados_mechanics::plugin::Analyses;
-use intrados_panels::{Action, PanelsPlugin, Selection};
+use intrados_forecast::ForecastSettings;
+use intrados_light::Render;
+use intrados_mechanics::plugin::{Analyses, ShownAt};
+use intrados_panels::{Action, Latest, PanelsPlugin, Selection, Viewpoint};
+use intrados_predict::{PredictSettings, Predicting};
 use intrados_scene::plugin::CurrentScene;
 use intrados_stage::Work;
 
-use super::{LONELY, Window, press, type_into, with_column, with_lonely};
+use super::{LONELY, Window, press, rest, type_into, with_column, with_lonely};
 
 /// Whether anything in the window has this text in its name.
 fn has(window: &Window, text: &str) -> bool {
@@ -136,4 +139,77 @@ fn keeping(file: &Path) -> Window {
     let mut app = intrados::simulation();
     app.add_plugins(PanelsPlugin { session: Some(file.to_owned()), ..PanelsPlugin::default() });
     Window::of(app)
+}
+
+/// The slider goes through the lives of the members: as they were, as they are known now, as they
+/// are forecast; all that shows members follows it.
+#[test]
+fn the_slider_goes_through_the_lives_of_members() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("column.ron");
+    fs::write(&file, intrados_scene::parametric::template("column").expect("a template"))
+        .expect("written");
+    let mut window = Window::new(|app| {
+        let forecast = ForecastSettings { element_m: Some(0.2), ..ForecastSettings::default() };
+        app.world_mut().resource_mut::<Predicting>().settings =
+            PredictSettings { forecast: Some(forecast), ..PredictSettings::default() };
+    });
+    window.ask(Action::Open(file));
+    window.until("the prediction", |w| {
+        w.get_resource::<Latest>().is_some_and(|l| l.result.is_some())
+    });
+    window.frames(3);
+    let shown = |window: &Window| window.with(|w| *w.resource::<ShownAt>());
+    assert_eq!(shown(&window), ShownAt(None));
+    let now = window.picture();
+    window.click("▶");
+    window.frames(2);
+    assert!(has(&window, "in "), "nothing says when that is");
+    let ShownAt(Some(later)) = shown(&window) else { panic!("surfaces stay as they are now") };
+    assert!(now != window.picture(), "years ahead look as now");
+    window.click("Now");
+    assert_eq!(shown(&window), ShownAt(None));
+    window.click("◀");
+    let ShownAt(Some(before)) = shown(&window) else { panic!("surfaces stay as they are now") };
+    assert!(before < later, "{before} {later}");
+    assert!(has(&window, " ago"), "nothing says when that was");
+    window.ask(Action::Select(Some(0)));
+    window.frames(3);
+    assert!(has(&window, "d of the worst zone by its life"), "the sheet has no course");
+}
+
+/// As it looks: the path-traced picture comes from where the structure is looked at, and goes again.
+#[test]
+fn the_structure_is_shown_as_it_looks() {
+    let mut window = with_column();
+    window.until("the prediction", |w| w.resource::<Latest>().result.is_some());
+    while window.harness.query_by_label_contains("is done").is_some() {
+        window.frame();
+        rest();
+    }
+    let walked = |window: &Window| window.walks();
+    let before = walked(&window);
+    window.frames(10);
+    assert_eq!(walked(&window), before, "nobody sees it");
+    let damage = window.picture();
+    window.click("As it looks");
+    window.until("a picture", |w| {
+        let camera = w.resource::<Viewpoint>().camera().cloned();
+        !w.resource::<Viewpoint>().is_preview()
+            && w.get_resource::<Render>().is_some_and(|r| {
+                r.samples_per_pixel() > 4.0
+                    && camera.is_some_and(|c| c.width > 400 && r.camera().width == c.width)
+            })
+    });
+    window.frames(20);
+    let light = window.picture();
+    let others = |picture: &image::RgbImage| {
+        damage.pixels().zip(picture.pixels()).filter(|(a, b)| a != b).count()
+    };
+    assert!(others(&light) > 100_000, "only {} pixels have changed", others(&light));
+    window.click("As it looks");
+    window.frames(3);
+    // The pointer and what is going on below differ, no more.
+    let again = others(&window.picture());
+    assert!(again < 40_000, "{again} pixels are not as before");
 }

@@ -20,7 +20,12 @@ use intrados_xray::plugin::{Scan, Scans};
 use plots::Order;
 use source::{Read, Source};
 
-use crate::{Actions, Selection, lang::drag, members, zoom::Zoom};
+use crate::{
+    Actions, Selection,
+    lang::{drag, term},
+    members,
+    zoom::Zoom,
+};
 
 /// Width of what stands beside the slice, points.
 const ASIDE: f32 = 290.0;
@@ -413,7 +418,7 @@ fn aside(
             }));
         }
         if let Some(first) = profile.failures.first() {
-            ui.label(tr!("⚠ {} not read", profile.failures.len())).on_hover_text(first);
+            ui.label(tr!("⚠ {} not read", profile.failures.len())).on_hover_text(term(first));
         }
     });
     let follow = std::mem::take(follow);

@@ -11,7 +11,7 @@ use intrados_xray::{
 
 use super::draw;
 use crate::{
-    lang::{drag, fixed},
+    lang::{drag, fixed, term},
     number::{percent, significant},
 };
 
@@ -142,9 +142,10 @@ pub(super) fn controls(
             }
         }
         match scan.map(|s| &s.work) {
-            Some(Work::Failed(why)) => {
-                drop(ui.colored_label(ui.visuals().error_fg_color, tr!("⚠ Not scanned: {}", why)))
-            }
+            Some(Work::Failed(why)) => drop(ui.colored_label(
+                ui.visuals().error_fg_color,
+                tr!("⚠ Not scanned: {}", term(&why.to_string())),
+            )),
             Some(Work::Cancelled) => drop(ui.label(tr!("⏹ Stopped"))),
             _ => {}
         }

@@ -424,7 +424,7 @@ fn aside(
         keep(ui, shot, added, scene, actions);
     });
     if let Some(why) = &shot.failure {
-        ui.label(tr!("⚠ Not read: {}", why));
+        ui.label(tr!("⚠ Not read: {}", term(&why.to_string())));
     }
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         finds(ui, shot, marked, actions, viewpoint);
@@ -440,7 +440,7 @@ fn stand(ui: &mut Ui, shot: &Shot, actions: &mut Actions, viewpoint: &mut Viewpo
             let picked = shot.picks.len();
             ui.weak(tr!("{} picked; 4 are needed where the focal length is known, else 6", picked));
         }
-        Some(Err(why)) => drop(ui.label(format!("⚠ {why}"))),
+        Some(Err(why)) => drop(ui.label(format!("⚠ {}", term(&why.to_string())))),
         Some(Ok(located)) => {
             ui.horizontal_wrapped(|ui| {
                 ui.label(tr!(

@@ -45,7 +45,7 @@ pub(crate) fn report(
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         progress(ui, &latest, &mut actions);
         for failure in &latest.failures {
-            ui.label(format!("⚠ {failure}"));
+            ui.label(format!("⚠ {}", term(failure)));
         }
         let Some(result) = &latest.result else {
             ui.label(tr!(
@@ -112,10 +112,10 @@ fn ledger(ui: &mut Ui, result: &Prediction) {
             let first = group.first();
             ui.label(result.name_of(&first.member));
             ui.label(term(called(first.source)));
-            ui.label(group.name());
+            ui.label(term(&group.name()));
             ui.label(match &first.why {
                 None => tr!("used"),
-                Some(why) => tr!("⚠ not used, because {}", why),
+                Some(why) => tr!("⚠ not used, because {}", term(why)),
             });
             ui.end_row();
         }
@@ -153,7 +153,7 @@ fn row(
         .values()
         .map(|e| format!("{} {}", term(called(e.source)), plus_minus(e.damage, e.std_error, "")))
         .collect();
-    let basis: Vec<&str> = member.evidence.values().map(|e| e.basis.as_str()).collect();
+    let basis: Vec<String> = member.evidence.values().map(|e| term(&e.basis)).collect();
     let conflict = if member.conflict { "⚠ " } else { "" };
     ui.add(egui::Label::new(format!("{conflict}{}", said.join(", "))).extend())
         .on_hover_text(basis.join("\n"));

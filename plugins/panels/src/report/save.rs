@@ -11,7 +11,7 @@ use intrados_scene::Scene;
 use intrados_stage::{Cancelled, Job, Jobs, Task, aside};
 
 use super::Report;
-use crate::{Banners, Log, saving::Written};
+use crate::{Banners, Log, lang::term, saving::Written};
 
 /// Where to, and the write that runs.
 #[derive(Default)]
@@ -114,7 +114,7 @@ pub(crate) fn take(mut report: ResMut<Report>, mut banners: ResMut<Banners>, mut
         Ok(files) => log.say(tr!("wrote {} files into {}", files, folder)),
         Err(RecordError::Cancelled(Cancelled)) => log.say(tr!("writing {} was cancelled", folder)),
         Err(error) => {
-            log.say(tr!("⚠ not saved: {}", error));
+            log.say(tr!("⚠ not saved: {}", term(&error.to_string())));
             banners.cannot(&tr!("Not saved"), &error.to_string());
         }
     }

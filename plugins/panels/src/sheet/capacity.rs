@@ -54,7 +54,7 @@ pub(super) fn capacity(
             Mode::None => tr!("It bears at least {} times {}.", times, loads),
             mode => tr!("It bears {} times {} (fails by {}).", times, loads, term(mode.words())),
         };
-        ui.label(bears).on_hover_text(c.because.as_str());
+        ui.label(bears).on_hover_text(term(&c.because));
         let [cost, error] = [c.cost.value, c.cost.std_error].map(|share| 100.0 * share);
         if cost > 0.0 || error > 0.0 {
             let [cost, error] = [cost, error].map(|percent| fixed(percent, 0));
@@ -137,7 +137,7 @@ fn result(ui: &mut Ui, analysis: &Analysis, member: &Member, actions: &mut Actio
             return false;
         }
         Work::Failed(why) => {
-            ui.label(tr!("⚠ Not computed: {}", why));
+            ui.label(tr!("⚠ Not computed: {}", term(why)));
             return false;
         }
         Work::Done(life) => &life.outcome,
@@ -158,9 +158,9 @@ fn result(ui: &mut Ui, analysis: &Analysis, member: &Member, actions: &mut Actio
 /// What a user must know before believing any of it.
 fn doubts(ui: &mut Ui, outcome: &Outcome) {
     if !outcome.complaint.is_empty() {
-        ui.label(tr!("⚠ ended early: {}", outcome.complaint));
+        ui.label(tr!("⚠ ended early: {}", term(&outcome.complaint)));
     }
-    outcome.warnings.iter().for_each(|why| drop(ui.label(format!("⚠ {why}"))));
+    outcome.warnings.iter().for_each(|why| drop(ui.label(format!("⚠ {}", term(why)))));
 }
 
 /// The extremes of its life.
@@ -196,9 +196,13 @@ fn bears(ui: &mut Ui, strength: &Strength) {
         fixed(1e3 * peak.displacement_m, 1)
     );
     copied(ui, RichText::new(text).strong());
-    ui.label(tr!("and fails by {}: {}", term(strength.mode.words()), strength.because));
+    ui.label(tr!("and fails by {}: {}", term(strength.mode.words()), term(&strength.because)));
     if let Some(yields) = &strength.yielding {
         ui.label(tr!("A bar yields first at {} × what acts.", fixed(yields.load_factor, 2)));
     }
-    ui.weak(tr!("Raised: {}. Followed until {}.", strength.loads.join(", "), strength.ended));
+    ui.weak(tr!(
+        "Raised: {}. Followed until {}.",
+        strength.loads.join(", "),
+        term(&strength.ended)
+    ));
 }

@@ -69,9 +69,9 @@ impl Listing {
             let source = term(called(first.source));
             let verdict = match &first.why {
                 None => tr!("used"),
-                Some(why) => tr!("not used, because {}", why),
+                Some(why) => tr!("not used, because {}", term(why)),
             };
-            ui.label(format!("{mark} {source}, {}: {verdict}", group.name()));
+            ui.label(format!("{mark} {source}, {}: {verdict}", term(&group.name())));
         }
     }
 }

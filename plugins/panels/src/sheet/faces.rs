@@ -88,7 +88,7 @@ fn row(ui: &mut Ui, number: usize, defect: &Defect) {
         ui.weak(format!("{}, {when}", term(called(defect.source))));
     });
     if let Some(change) = defect.change() {
-        ui.weak(change);
+        ui.weak(term(&change));
     }
     if let Some(picture) = &defect.picture {
         thumbnail(ui, number, picture);
@@ -110,7 +110,7 @@ fn thumbnail(ui: &mut Ui, number: usize, picture: &intrados_ct::Picture) {
     });
     let size = texture.size_vec2();
     let scale = (ui.available_width().min(220.0) / size.x).min(120.0 / size.y).min(1.0);
-    ui.image((texture.id(), scale * size)).on_hover_text(&picture.caption);
+    ui.image((texture.id(), scale * size)).on_hover_text(term(&picture.caption));
 }
 
 /// The surface laid flat. What has no side lies in a row of its own beneath.

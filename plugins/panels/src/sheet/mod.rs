@@ -203,10 +203,10 @@ fn sources(ui: &mut Ui, told: &MemberPrediction) {
             ui.strong(term(called(source)));
             copied(ui, RichText::new(format!("d = {}", plus_minus(e.damage, e.std_error, ""))));
         });
-        ui.label(&e.basis);
+        ui.label(term(&e.basis));
     }
     for conflict in &told.conflicts {
-        ui.label(tr!("⚠ contradicting: {}", conflict));
+        ui.label(tr!("⚠ contradicting: {}", term(conflict)));
     }
 }
 
@@ -235,14 +235,14 @@ fn foretold(ui: &mut Ui, told: &MemberPrediction, course: Option<&Course>, momen
     };
     let value = plus_minus(forecast.damage, forecast.std_error, "");
     copied(ui, RichText::new(format!("d = {}", value.trim())));
-    ui.label(&forecast.basis);
+    ui.label(term(&forecast.basis));
     if let Some(course) = course {
         life(ui, course, moment);
     }
     let rust = forecast.details.get("rust");
     let Some(rust) = rust else { return };
     if let Some(why) = rust["why_not"].as_str() {
-        ui.weak(tr!("Rust: {}", why));
+        ui.weak(tr!("Rust: {}", term(why)));
         return;
     }
     let number = |name: &str| rust[name].as_f64();

@@ -8,7 +8,7 @@ use egui::{Button, Ui};
 use intrados_scene::{Member, Scene, attach::fields};
 
 use super::part;
-use crate::{Action, Actions, values::Values};
+use crate::{Action, Actions, lang::term, values::Values};
 
 /// What has been typed; of another member or another scene it is begun anew.
 #[derive(Resource, Default)]
@@ -70,7 +70,7 @@ impl Properties {
                 self.values.discard();
             }
             match (&filled, count) {
-                (Err(why), _) => ui.label(format!("⚠ {why}")),
+                (Err(why), _) => ui.label(format!("⚠ {}", term(&why.to_string()))),
                 (Ok(_), 0) => ui.weak(tr!("as in {}", file)),
                 (Ok(_), 1) => ui.label(tr!("one value changed")),
                 (Ok(_), n) => ui.label(tr!("{} values changed", n)),

@@ -29,7 +29,7 @@ use quantity::Quantity;
 
 use crate::{
     Actions, Log, Selection, colours,
-    lang::{drag, fixed, local, term},
+    lang::{drag, fixed, lines, local, slide, term},
     members,
     number::significant,
     surface::{self, Drawn, Surface, bounds, hand, place},
@@ -143,7 +143,7 @@ pub(crate) fn take(mut stress: ResMut<Stress>, mut log: ResMut<Log>) {
     let Some(done) = Task::take(&mut stress.task) else { return };
     match done {
         Ok(Ok(what)) => log.say(tr!("wrote {}", what)),
-        Ok(Err(error)) => log.say(tr!("not written: {}", error)),
+        Ok(Err(error)) => log.say(tr!("not written: {}", term(&error))),
         Err(_) => log.say(tr!("not written: the writer broke off")),
     }
 }
@@ -321,7 +321,7 @@ fn state(ui: &mut Ui, analysis: &Analysis, part: &str) {
             ui.label(tr!("⏹ Stopped: what had been found until then is shown."));
         }
         Work::Failed(why) => {
-            ui.colored_label(ui.visuals().error_fg_color, tr!("⚠ Not computed: {}", why));
+            ui.colored_label(ui.visuals().error_fg_color, tr!("⚠ Not computed: {}", term(why)));
         }
         Work::Done(life) => ended(ui, &life.outcome, part),
     }
@@ -329,7 +329,7 @@ fn state(ui: &mut Ui, analysis: &Analysis, part: &str) {
 
 fn ended(ui: &mut Ui, outcome: &Outcome, part: &str) {
     if !outcome.complaint.is_empty() {
-        let text = tr!("⚠ Ended early: {}", outcome.complaint);
+        let text = tr!("⚠ Ended early: {}", term(&outcome.complaint));
         ui.add(
             egui::Label::new(egui::RichText::new(&text).color(ui.visuals().warn_fg_color))
                 .truncate(),
@@ -341,8 +341,7 @@ fn ended(ui: &mut Ui, outcome: &Outcome, part: &str) {
             ui.weak(text);
         }
         if !outcome.notes.is_empty() {
-            ui.label(tr!("ℹ {} notes", outcome.notes.len()))
-                .on_hover_text(outcome.notes.join("\n"));
+            ui.label(tr!("ℹ {} notes", outcome.notes.len())).on_hover_text(lines(&outcome.notes));
         }
     });
 }
@@ -359,7 +358,7 @@ fn controls(ui: &mut Ui, stress: &mut Stress, skin: &Skin, auto: f32) {
         });
         let label = ui.label(tr!("Deformation ×"));
         let mut scale = stress.scale.unwrap_or(auto);
-        let slider = lang::slide(&mut scale, 0.0..=(20.0 * auto).max(100.0))
+        let slider = slide(&mut scale, 0.0..=(20.0 * auto).max(100.0))
             .logarithmic(true)
             .smallest_positive(0.1)
             .max_decimals(1);

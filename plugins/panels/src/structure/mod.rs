@@ -70,27 +70,13 @@ impl Default for Structure {
         let (model, tape) = (model::Model::default(), Tape::default());
         let earlier = model::Model::earlier();
         let (is_lit, settling) = (false, Settling::default());
-        Self {
-            model,
-            earlier,
-            names: true,
-            section: None,
-            tape,
-            wished: None,
-            is_lit,
-            settling,
-        }
+        Self { model, earlier, names: true, section: None, tape, wished: None, is_lit, settling }
     }
 }
 
 impl Structure {
     pub(crate) fn look(&mut self, view: View) {
         self.wished = Some(view);
-    }
-
-    /// Whether it shows the path-traced picture.
-    pub(crate) fn is_lit(&self) -> bool {
-        self.is_lit
     }
 
     /// The place on a member that is at a point of the window, while the picture is in sight.

@@ -1,10 +1,10 @@
 //! A plane that cuts the structure open, so that one can look into it.
 
-use egui::{Slider, Ui};
+use egui::Ui;
 use glam::Vec3;
 use intrados_report::surface::Facet;
 
-use crate::lang::term;
+use crate::lang::{slide, term};
 
 /// Directions that planes may be across, by what an engineer calls them.
 const AXES: [(&str, Vec3); 3] = [("x", Vec3::X), ("height", Vec3::Y), ("z", Vec3::Z)];
@@ -59,7 +59,7 @@ impl Section {
         let [from, to] = bounds.map(|b| b.dot(axis));
         let mut level = self.level(bounds);
         ui.spacing_mut().slider_width = 110.0;
-        let slider = lang::slide(&mut level, from..=to).suffix(" m").max_decimals(2);
+        let slider = slide(&mut level, from..=to).suffix(" m").max_decimals(2);
         if ui.add(slider).labelled_by(label.id).changed() && to > from {
             self.share = ((level - from) / (to - from)).clamp(0.0, 1.0);
         }

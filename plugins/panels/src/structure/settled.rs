@@ -31,6 +31,7 @@ impl Settling {
     /// Lays the picture over what is in `rect`, as far as it is there; asks for it once nobody moves
     /// the structure any more.
     pub(super) fn show(&mut self, ui: &Ui, rect: Rect, camera: &Camera, light: &mut Light<'_>) {
+        light.viewpoint.bypass_change_detection().is_seen = true;
         let density = ui.ctx().pixels_per_point();
         let side = |points: f32| (points * density).max(8.0) as u32;
         let wanted =

@@ -36,7 +36,9 @@ pub(super) fn bar(ui: &mut Ui, moment: &mut Moment, timeline: &Timeline) {
     step(ui, "▶", &tr!("The next equilibrium"), timeline.beyond(moment.years, true), moment);
     ui.strong(told(moment.years, timeline));
     if moment.years > 0.0 && !moment.is_now() {
-        let hint = tr!("Damage by the forecast then less that of now, instead of what is known now and what is forecast beyond it");
+        let hint = tr!(
+            "Damage by the forecast then less that of now, instead of what is known now and what is forecast beyond it"
+        );
         ui.toggle_value(&mut moment.added, tr!("Only what is added")).on_hover_text(hint);
     }
 }
