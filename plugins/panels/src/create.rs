@@ -155,7 +155,7 @@ pub(crate) fn dialog(InMut(ui): InMut<Ui>, mut creation: ResMut<Creation>, mut j
         match &creation.draft {
             Some(draft) => {
                 let mut inner = ui.new_child(egui::UiBuilder::new().max_rect(rect));
-                creation.preview.show(&mut inner, rect, &draft.scene);
+                creation.preview.show(&mut inner, rect, &draft.scene, jobs);
             }
             None => drop(ui.put(rect, egui::Spinner::new())),
         }

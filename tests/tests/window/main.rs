@@ -1202,15 +1202,19 @@ fn a_photograph_is_placed_by_its_corners_and_becomes_evidence() {
     let corners = site.surface(0).unwrap().outline().corners;
     assert_eq!(corners.len(), 8);
     let pose = Pose::of(&camera);
-    let rect = window.harness.get_by_label("Photograph").rect();
-    let scale = f64::from(rect.width().min(rect.height())) / 400.0;
+    // Where it is moves as what is said of the picks grows.
+    let pick = |window: &mut Window, k: usize, corner: glam::DVec3| {
+        window.click(&format!("Corner {}", k + 1));
+        let rect = window.harness.get_by_label("Photograph").rect();
+        let scale = f64::from(rect.width().min(rect.height())) / 400.0;
+        let [u, v] = pose.project(corner).unwrap();
+        let to = egui::vec2((scale * (u - 200.0)) as f32, (scale * (v - 200.0)) as f32);
+        press(window, rect.center() + to);
+    };
     // The two at the back on the left are behind the pillar.
     let seen = |p: &glam::DVec3| p.z > 0.0 || p.x > 0.0;
     for (k, corner) in corners.iter().enumerate().filter(|(_, p)| seen(p)) {
-        window.click(&format!("Corner {}", k + 1));
-        let [u, v] = pose.project(*corner).unwrap();
-        let to = egui::vec2((scale * (u - 200.0)) as f32, (scale * (v - 200.0)) as f32);
-        press(&mut window, rect.center() + to);
+        pick(&mut window, k, *corner);
     }
     // A pick that was wrong is taken back, and made again.
     let is_placed =
@@ -1229,10 +1233,7 @@ fn a_photograph_is_placed_by_its_corners_and_becomes_evidence() {
         }
     }
     let last = corners.iter().enumerate().rfind(|(_, p)| seen(p)).expect("a corner");
-    window.click(&format!("Corner {}", last.0 + 1));
-    let [u, v] = pose.project(*last.1).unwrap();
-    let to = egui::vec2((scale * (u - 200.0)) as f32, (scale * (v - 200.0)) as f32);
-    press(&mut window, rect.center() + to);
+    pick(&mut window, last.0, *last.1);
     for _ in 0..2000 {
         if window.harness.query_by_label_contains("Taken from").is_some() {
             break;

@@ -65,7 +65,11 @@ pub(super) fn at_rest() -> (Window, tempfile::TempDir) {
 
 /// What is seen once nothing moves any more, half as large, which shows as well what has changed.
 fn settled(window: &mut Window) -> RgbImage {
-    window.frames(SETTLED);
+    // Pictures of members are drawn off the frame.
+    for _ in 0..SETTLED {
+        window.frame();
+        rest();
+    }
     image::imageops::thumbnail(&window.picture(), 640, 400)
 }
 

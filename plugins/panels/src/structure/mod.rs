@@ -14,6 +14,7 @@ use bevy_ecs::prelude::*;
 use egui::{Rect, Ui, vec2};
 use glam::Vec3;
 use intrados_scene::{Scene, plugin::CurrentScene};
+use intrados_stage::Jobs;
 use measure::Tape;
 use model::Scale;
 use section::Section;
@@ -95,8 +96,8 @@ impl Default for Preview {
 }
 
 impl Preview {
-    pub(crate) fn show(&mut self, ui: &mut Ui, rect: Rect, scene: &Arc<Scene>) {
-        let shown = self.0.show(ui, rect, scene, &[], Scale::DAMAGE, Selection(None), None);
+    pub(crate) fn show(&mut self, ui: &mut Ui, rect: Rect, scene: &Arc<Scene>, jobs: &mut Jobs) {
+        let shown = self.0.show(ui, rect, scene, &[], Scale::DAMAGE, Selection(None), None, jobs);
         shown.iter().for_each(|shown| model::ruler(ui, rect, &shown.camera));
     }
 }
@@ -112,10 +113,12 @@ pub(crate) fn structure(
     mut moment: ResMut<Moment>,
     mut light: Light<'_>,
     mut form: ResMut<Form>,
+    mut jobs: ResMut<Jobs>,
     mut actions: ResMut<Actions>,
 ) {
     let Some(scene) = scene else { return };
     let scene = &scene.0;
+    let jobs = jobs.bypass_change_detection();
     let whole = ui.available_rect_before_wrap();
     let history = history.bypass_change_detection();
     let structure = structure.bypass_change_detection();
@@ -145,12 +148,13 @@ pub(crate) fn structure(
                 earlier,
                 scene,
                 *selection,
+                jobs,
                 &mut actions,
             );
             right
         }
     };
-    let pointed = structure.model.show(ui, rect, scene, &seen, scale, *selection, section);
+    let pointed = structure.model.show(ui, rect, scene, &seen, scale, *selection, section, jobs);
     let Some(pointed) = pointed else { return };
     if is_lit {
         structure.settling.show(ui, rect, &pointed.camera, &mut light);
@@ -185,10 +189,12 @@ fn beside(
     earlier: &Earlier,
     scene: &Arc<Scene>,
     selection: Selection,
+    jobs: &mut Jobs,
     actions: &mut Actions,
 ) {
     let (seen, section) = (earlier.seen(scene), structure.section);
-    let shown = structure.earlier.show(ui, rect, scene, &seen, Scale::DAMAGE, selection, section);
+    let shown =
+        structure.earlier.show(ui, rect, scene, &seen, Scale::DAMAGE, selection, section, jobs);
     let Some(pointed) = shown else { return };
     model::ruler(ui, rect, &pointed.camera);
     structure.model.follow(&pointed.camera);

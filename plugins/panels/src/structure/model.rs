@@ -6,6 +6,7 @@ use egui::{Align2, Color32, Rect, Sense, TextureHandle, TextureOptions, Ui, pos2
 use glam::Vec3;
 use intrados_report::surface::{Facet, facets};
 use intrados_scene::{Camera, Scene};
+use intrados_stage::{Jobs, Task, alone};
 use rayon::prelude::*;
 
 use super::{section::Section, spot::Spot};
@@ -31,6 +32,9 @@ const INK: f32 = 0.62;
 const HATCH: usize = 9;
 /// Most names of members in the picture.
 const MOST_NAMES: usize = 40;
+
+/// Pixels that are drawn within a frame.
+const COARSE: f64 = 4e5;
 
 /// Width of the legend, points.
 const LEGEND: f32 = 92.0;
@@ -75,10 +79,20 @@ pub(super) struct Model {
     positions: Vec<Vec3>,
     camera: Option<Camera>,
     shown: Option<Shown>,
+    /// The fine picture that is being drawn, and what of.
+    coming: Option<(Key, Task<Painted>)>,
+}
+
+/// A picture, and the facets that are in it.
+struct Painted {
+    facets: Arc<Vec<Facet>>,
+    drawn: Drawn,
 }
 
 struct Shown {
     key: Key,
+    /// Drawn with four samples a pixel, not with one of several pixels.
+    is_fine: bool,
     /// What is drawn: the structure, or what a section has left of it.
     facets: Arc<Vec<Facet>>,
     rect: Rect,
@@ -93,8 +107,24 @@ struct Key {
     selection: Selection,
     camera: Camera,
     size: [usize; 2],
-    over: usize,
     section: Option<Section>,
+}
+
+impl Key {
+    /// What the colour of a facet is by.
+    fn value(&self, facet: &Facet) -> f32 {
+        let seen = &self.seen[facet.member];
+        let share = |d: f64| (d / self.scale.top).min(1.0) as f32;
+        let damage = seen.zones[facet.zone].map_or(f32::NAN, share);
+        let damage = if seen.foretold[facet.zone] { damage + FORECAST } else { damage };
+        let is_aside = self.selection.0.is_some_and(|s| s != facet.member);
+        if is_aside { damage + ASIDE } else { damage }
+    }
+
+    /// Whether both show the same faces at the same places, whatever their colours.
+    fn is_where(&self, other: &Self) -> bool {
+        (&self.camera, self.size, self.section) == (&other.camera, other.size, other.section)
+    }
 }
 
 /// What the pointer does in the picture.
@@ -127,6 +157,7 @@ impl Model {
         scale: Scale,
         selection: Selection,
         section: Option<Section>,
+        jobs: &mut Jobs,
     ) -> Option<Pointed> {
         self.adopt(scene);
         ui.painter().rect_filled(rect, 0.0, ground(ui));
@@ -155,7 +186,19 @@ impl Model {
         let camera = hand(ui, &response, rect, camera);
         let is_moving = response.dragged() || camera != before;
         self.camera = Some(camera.clone());
-        self.redraw(ui, rect, seen, scale, selection, camera.clone(), section, is_moving);
+        let members = self.facets.iter().map(|f| f.member + 1).max().unwrap_or(0);
+        let of = |member: usize| seen.get(member).copied().unwrap_or_default();
+        let density = ui.ctx().pixels_per_point();
+        let size = [rect.width(), rect.height()].map(|points| (points * density).round() as usize);
+        let key = Key {
+            seen: (0..members).map(of).collect(),
+            scale,
+            selection,
+            camera: camera.clone(),
+            size: size.map(|n| n.clamp(8, 4096)),
+            section,
+        };
+        self.redraw(ui, rect, key, is_moving, jobs);
         let shown = self.shown.as_ref()?;
         let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
         ui.painter().image(shown.texture.id(), rect, whole, Color32::WHITE);
@@ -197,7 +240,7 @@ impl Model {
         let camera = self.camera.take().filter(|_| is_alike);
         let facets = Arc::new(facets);
         let (of, of_what) = (scene.hash.clone(), self.of_what);
-        *self = Self { of_what, of, facets, positions, camera, shown: None };
+        *self = Self { of_what, of, facets, positions, camera, shown: None, coming: None };
     }
 
     /// Looks from another place, so that what is wanted fills the picture.
@@ -287,60 +330,37 @@ impl Model {
         Section::through(0.5 * (low + high), whole)
     }
 
-    fn redraw(
-        &mut self,
-        ui: &Ui,
-        rect: Rect,
-        seen: &[Seen],
-        scale: Scale,
-        selection: Selection,
-        camera: Camera,
-        section: Option<Section>,
-        held: bool,
-    ) {
-        let members = self.facets.iter().map(|f| f.member + 1).max().unwrap_or(0);
-        let of = |member: usize| seen.get(member).copied().unwrap_or_default();
-        let density = ui.ctx().pixels_per_point();
-        let size =
-            [rect.width() * density, rect.height() * density].map(|n| (n as usize).clamp(8, 4096));
-        // Fine when nobody moves it.
-        let key = Key {
-            seen: (0..members).map(of).collect(),
-            scale,
-            selection,
-            camera,
-            size,
-            over: if held { 1 } else { 2 },
-            section,
-        };
-        if self.shown.as_ref().is_some_and(|s| s.key == key) {
-            return;
+    /// Draws it anew where that is needed: at once and coarsely what moves, off the frame and finely
+    /// what rests.
+    fn redraw(&mut self, ui: &Ui, rect: Rect, key: Key, is_moving: bool, jobs: &mut Jobs) {
+        if let Some((of, task)) = self.coming.take() {
+            let mut task = Some(task);
+            match (Task::take(&mut task), task) {
+                (Some(Ok(painted)), _) if of == key => self.put(ui, rect, of, painted, true),
+                (None, Some(task)) if of == key => self.coming = Some((of, task)),
+                // What broke off once would do so again: the coarse one stays.
+                (Some(Err(_)), _) => self.shown.iter_mut().for_each(|s| s.is_fine = s.key == of),
+                _ => {}
+            }
         }
-        let cut = section.map(|s| Arc::new(s.cut(&self.facets, bounds(&self.positions))));
-        let facets = cut.unwrap_or_else(|| Arc::clone(&self.facets));
-        let value = |f: &Facet| {
-            let seen = &key.seen[f.member];
-            let share = |d: f64| (d / scale.top).min(1.0) as f32;
-            let damage = seen.zones[f.zone].map_or(f32::NAN, share);
-            let damage = if seen.foretold[f.zone] { damage + FORECAST } else { damage };
-            if selection.0.is_some_and(|s| s != f.member) { damage + ASIDE } else { damage }
-        };
-        let values: Vec<f32> = facets.iter().flat_map(|f| [value(f); 3]).collect();
-        let positions: Vec<Vec3> = facets.iter().flat_map(|f| f.corners).collect();
-        let faces: Vec<[u32; 4]> =
-            (0..facets.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2, 3 * i + 2]).collect();
-        let surface = Surface {
-            positions: &positions,
-            values: &values,
-            faces: &faces,
-            mesh: false,
-            sun: Some(sun(&key.camera)),
-        };
-        let mut drawn = draw(&key.camera, key.size, key.over, &surface, colour);
-        if section.is_some() {
-            hatch(&mut drawn, &facets, &key.camera);
+        let before = self.shown.as_ref();
+        if before.is_none_or(|shown| !shown.key.is_where(&key)) {
+            let painted = self.painter(&key)(coarse(key.size), 1);
+            self.put(ui, rect, key.clone(), painted, false);
         }
-        ink(&mut drawn, &facets, selection);
+        let is_there = self.shown.as_ref().is_some_and(|s| s.is_fine && s.key == key);
+        if !is_there && !is_moving && self.coming.is_none() {
+            let (size, paint) = (key.size, self.painter(&key));
+            let task = Task::spawn_unlisted(jobs, "drawing", move |_| alone(|| paint(size, 2)));
+            self.coming = Some((key, task));
+        }
+        if self.coming.is_some() {
+            ui.ctx().request_repaint();
+        }
+    }
+
+    fn put(&mut self, ui: &Ui, rect: Rect, key: Key, painted: Painted, is_fine: bool) {
+        let Painted { facets, drawn } = painted;
         let texture = match self.shown.take() {
             Some(mut before) => {
                 before.texture.set(drawn.image.clone(), TextureOptions::LINEAR);
@@ -348,8 +368,44 @@ impl Model {
             }
             None => ui.ctx().load_texture("damage", drawn.image.clone(), TextureOptions::LINEAR),
         };
-        self.shown = Some(Shown { key, facets, rect, drawn, texture });
+        self.shown = Some(Shown { key, is_fine, facets, rect, drawn, texture });
     }
+
+    /// What draws it in so many pixels, with so many samples in each along both axes.
+    fn painter(&self, key: &Key) -> impl FnOnce([usize; 2], usize) -> Painted + Send + 'static {
+        let (whole, key) = (Arc::clone(&self.facets), key.clone());
+        let bounds = bounds(&self.positions);
+        move |size, over| {
+            let facets = match key.section {
+                Some(section) => Arc::new(section.cut(&whole, bounds)),
+                None => whole,
+            };
+            let values: Vec<f32> = facets.iter().flat_map(|f| [key.value(f); 3]).collect();
+            let positions: Vec<Vec3> = facets.iter().flat_map(|f| f.corners).collect();
+            let faces: Vec<[u32; 4]> = (0..facets.len() as u32)
+                .map(|i| [3 * i, 3 * i + 1, 3 * i + 2, 3 * i + 2])
+                .collect();
+            let surface = Surface {
+                positions: &positions,
+                values: &values,
+                faces: &faces,
+                mesh: false,
+                sun: Some(sun(&key.camera)),
+            };
+            let mut drawn = draw(&key.camera, size, over, &surface, colour);
+            if key.section.is_some() {
+                hatch(&mut drawn, &facets, &key.camera);
+            }
+            ink(&mut drawn, &facets, key.selection);
+            Painted { facets, drawn }
+        }
+    }
+}
+
+/// A size with few enough pixels to be drawn within a frame.
+fn coarse([width, height]: [usize; 2]) -> [usize; 2] {
+    let times = ((width * height) as f64 / COARSE).sqrt().max(1.0);
+    [width, height].map(|n| ((n as f64 / times) as usize).max(8))
 }
 
 impl Shown {
