@@ -103,11 +103,9 @@ pub(crate) fn say(text: &str, values: &[&dyn Display]) -> String {
 /// values in it is found by the term that has `{}` for them, and they are terms again. As it is,
 /// where it has no translation.
 pub(crate) fn term(text: &str) -> String {
-    let said = column().map(|column| words().get(text).map(|of| &of[column]));
-    match said {
-        None => return text.to_owned(),
-        Some(Some(said)) => return said.clone(),
-        Some(None) => {}
+    let Some(column) = column() else { return text.to_owned() };
+    if let Some(said) = words().get(text) {
+        return said[column].clone();
     }
     let found = patterns().iter().find_map(|pattern| Some((pattern, values(pattern, text)?)));
     let Some((pattern, values)) = found else { return text.to_owned() };
