@@ -120,6 +120,8 @@ pub enum Action {
     ChooseSave,
     /// Write the window as it is seen, or one panel of it, as PNG.
     TakePicture(PathBuf, Option<String>),
+    /// Put the window as it is seen on the clipboard, or one panel of it.
+    CopyPicture(Option<String>),
     /// Show or hide the list of keys.
     Keys,
     /// Show or hide the list of all commands.
@@ -178,16 +180,8 @@ fn carry_out(world: &mut World, action: Action) {
             let name = world.resource::<Saving>().proposal();
             Dialogs::open(world, Purpose::Take(name));
         }
-        Action::TakePicture(path, panel) => {
-            let of = panel.map(|panel| world.resource::<Desk>().place(&panel));
-            match of {
-                Some(None) => world.resource_mut::<Banners>().cannot(
-                    &tr!("No picture"),
-                    &tr!("this panel is not in sight: bring it to the front"),
-                ),
-                of => world.resource_mut::<Saving>().take_picture(path, of.flatten()),
-            }
-        }
+        Action::TakePicture(path, panel) => take_picture(world, Some(path), panel),
+        Action::CopyPicture(panel) => take_picture(world, None, panel),
         Action::Open(path) => open(world, path),
         Action::MakeProject => {
             if let Some(model) = world.get_resource::<CurrentScene>().map(|s| s.0.path.clone()) {
@@ -279,6 +273,17 @@ fn carry_out(world: &mut World, action: Action) {
         }
         Action::Palette => world.resource_mut::<Palette>().toggle(),
         Action::Dismiss => dismiss(world),
+    }
+}
+
+/// Of the window, or of a panel that is in sight.
+fn take_picture(world: &mut World, path: Option<PathBuf>, panel: Option<String>) {
+    let of = panel.map(|panel| world.resource::<Desk>().place(&panel));
+    match of {
+        Some(None) => world
+            .resource_mut::<Banners>()
+            .cannot(&tr!("No picture"), &tr!("this panel is not in sight: bring it to the front")),
+        of => world.resource_mut::<Saving>().take_picture(path, of.flatten()),
     }
 }
 

@@ -86,6 +86,18 @@ fn fixed(look: &Look) -> Vec<Command> {
             None,
             Action::Save(Taken::Picture(Some("Structure".into()))),
         ),
+        command(
+            tr!("copy a picture of the window"),
+            "Ctrl+Shift+C",
+            by(shifted, Key::C),
+            Action::CopyPicture(None),
+        ),
+        command(
+            tr!("copy a picture of the structure, with its legend"),
+            "",
+            None,
+            Action::CopyPicture(Some("Structure".into())),
+        ),
         command(tr!("attach evidence"), "A", by(NONE, Key::A), Action::Fill(Vec::new(), None)),
         // Before the one that asks for less: Ctrl+Z alone would take Shift along.
         command(tr!("redo"), "Ctrl+Shift+Z  Ctrl+Y", by(shifted, Key::Z), Action::Redo),

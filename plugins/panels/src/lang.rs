@@ -103,8 +103,9 @@ pub(crate) fn say(text: &str, values: &[&dyn Display]) -> String {
 /// values in it is found by the term that has `{}` for them, and they are terms again. As it is,
 /// where it has no translation.
 pub(crate) fn term(text: &str) -> String {
-    if spoken() == Language::English || words().contains_key(text) {
-        return translated(text).to_owned();
+    let Some(column) = column() else { return text.to_owned() };
+    if let Some(said) = words().get(text) {
+        return said[column].clone();
     }
     let found = patterns().iter().find_map(|pattern| Some((pattern, values(pattern, text)?)));
     let Some((pattern, values)) = found else { return text.to_owned() };
@@ -152,14 +153,18 @@ fn values<'a>(pattern: &str, text: &'a str) -> Option<Vec<&'a str>> {
     Some(values)
 }
 
+/// Which of the translations is spoken; none: English.
+fn column() -> Option<usize> {
+    match spoken() {
+        Language::English => None,
+        Language::German => Some(0),
+        Language::Chinese => Some(1),
+    }
+}
+
 fn translated(text: &str) -> &str {
-    let english = text.split_once('|').map_or(text, |(english, _)| english);
-    let column = match spoken() {
-        Language::English => return english,
-        Language::German => 0,
-        Language::Chinese => 1,
-    };
-    words().get(text).map_or(english, |of| of[column].as_str())
+    let said = column().and_then(|column| Some(words().get(text)?[column].as_str()));
+    said.unwrap_or_else(|| text.split_once('|').map_or(text, |(english, _)| english))
 }
 
 fn words() -> &'static HashMap<String, [String; 2]> {
@@ -316,6 +321,7 @@ mod tests {
         let said = term("reading slice 3 of 10");
         speak(Language::English);
         assert_eq!(said, "Schnittbild 3 von 10 wird ausgewertet");
+        assert_eq!(term("a name | of another"), "a name | of another");
     }
 
     #[test]

@@ -44,6 +44,10 @@ use crate::{
     workspace::{self, Desk},
 };
 
+/// From the right rim of the window to where the form of evidence opens, points: beside the picture,
+/// in which one shows where it is.
+const FORM: f32 = 660.0;
+
 /// What is open.
 #[derive(Resource, Default)]
 pub(crate) struct Layout {
@@ -440,7 +444,7 @@ fn sheets(
             .open(&mut open)
             .collapsible(false)
             .resizable(false)
-            .default_pos(ui.ctx().content_rect().center() - egui::vec2(320.0, 300.0))
+            .default_pos(ui.ctx().content_rect().right_top() + egui::vec2(-FORM, 60.0))
             .show(ui.ctx(), |ui| run(world, form, "attach evidence", ui));
         world.resource_mut::<Form>().is_open &= open;
     }

@@ -37,6 +37,14 @@ pub(crate) fn dolly(camera: &Camera, factor: f32) -> Camera {
     Camera { position: camera.target + arm * (wanted / length.max(1e-6)), ..camera.clone() }
 }
 
+/// The same view of what is at the target, from farther away through a narrower angle (degrees), or
+/// the other way round: from very far lines that are parallel look so.
+pub(crate) fn narrowed(camera: &Camera, fov_deg: f32) -> Camera {
+    let half = |degrees: f32| (0.5 * degrees.to_radians()).tan();
+    let arm = (camera.position - camera.target) * (half(camera.fov_deg) / half(fov_deg));
+    Camera { position: camera.target + arm, fov_deg, ..camera.clone() }
+}
+
 /// The same view with at most `pixels` pixels.
 pub(crate) fn resized(camera: &Camera, pixels: u32) -> Camera {
     if camera.width as f32 * camera.height as f32 <= pixels as f32 {
@@ -82,6 +90,15 @@ mod tests {
         let above = orbit(&camera(), 0.0, 10.0);
         assert!(((above.position - above.target).length() - 4.0).abs() < 1e-4);
         assert!(above.position.y > 4.9 && above.position.z > 0.0, "{}", above.position);
+    }
+
+    #[test]
+    fn what_is_at_the_target_stays_as_large_from_far_away() {
+        let far = narrowed(&camera(), 1.0);
+        let half = |c: &Camera| c.half_extent()[0] * (c.position - c.target).length();
+        assert!((half(&far) / half(&camera()) - 1.0).abs() < 1e-4, "{far:?}");
+        assert!((far.position - far.target).length() > 100.0);
+        assert!(narrowed(&far, 60.0).position.distance(camera().position) < 1e-3);
     }
 
     #[test]

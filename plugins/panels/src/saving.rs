@@ -44,8 +44,9 @@ pub(crate) struct Saving {
     path: String,
     with_pdf: bool,
     task: Option<Task<Result<Written, String>>>,
-    /// A picture that is to be taken of the window, once it is drawn.
-    wanted: Option<(PathBuf, Option<Rect>)>,
+    /// A picture that is to be taken of the window, once it is drawn; without a file for the
+    /// clipboard.
+    wanted: Option<(Option<PathBuf>, Option<Rect>)>,
     /// Where it comes, once it was asked for.
     coming: Option<Mutex<mpsc::Receiver<Arc<ColorImage>>>>,
 }
@@ -85,8 +86,9 @@ impl Saving {
         self.path = path.display().to_string();
     }
 
-    /// Takes a picture of the window, or of what is at a place in it, in the next frame.
-    pub(crate) fn take_picture(&mut self, path: PathBuf, of: Option<Rect>) {
+    /// Takes a picture of the window, or of what is at a place in it, in the next frame, for a file
+    /// or for the clipboard.
+    pub(crate) fn take_picture(&mut self, path: Option<PathBuf>, of: Option<Rect>) {
         self.wanted = Some((path, of));
     }
 }
@@ -244,18 +246,33 @@ pub(crate) fn picture(ui: &Ui, world: &mut World) {
     {
         saving.coming = None;
         let density = ui.ctx().pixels_per_point();
-        let mut jobs = world.resource_mut::<Jobs>();
-        let label = tr!("writing {}", path.display());
-        saving.task = Some(Task::spawn(&mut jobs, label, move |_| {
-            let part = match of {
-                Some(rect) => cut(&image, rect, density),
-                None => ColorImage::clone(&image),
-            };
-            write_png(&part, &path).map_err(|e| format!("{}: {e}", path.display()))?;
-            Ok(Written { files: None, path })
-        }));
+        let part = match of {
+            Some(rect) => cut(&image, rect, density),
+            None => ColorImage::clone(&image),
+        };
+        match path {
+            Some(path) => {
+                let mut jobs = world.resource_mut::<Jobs>();
+                saving.task = Some(write_picture(&mut jobs, part, path));
+            }
+            None => {
+                ui.ctx().copy_image(part);
+                world.resource_mut::<Toasts>().say(tr!("The picture is on the clipboard"));
+            }
+        }
     }
     *world.resource_mut::<Saving>() = saving;
+}
+
+fn write_picture(
+    jobs: &mut Jobs,
+    picture: ColorImage,
+    path: PathBuf,
+) -> Task<Result<Written, String>> {
+    Task::spawn(jobs, tr!("writing {}", path.display()), move |_| {
+        write_png(&picture, &path).map_err(|e| format!("{}: {e}", path.display()))?;
+        Ok(Written { files: None, path })
+    })
 }
 
 /// What of a picture lies in a rectangle of so many points.

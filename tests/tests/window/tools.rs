@@ -220,3 +220,36 @@ fn the_structure_is_shown_as_it_looks() {
     let again = others(&window.picture());
     assert!(again < 40_000, "{again} pixels are not as before");
 }
+
+/// While evidence is filled in, dragging along the selected member says where on it, and turns
+/// nothing.
+#[test]
+fn evidence_is_placed_by_dragging_along_its_member() {
+    let mut window = with_column();
+    window.ask(Action::Select(Some(0)));
+    window.ask(Action::Frame);
+    window.frames(3);
+    let rect = window.harness.get_by_label("Damage of members").rect();
+    window.ask(Action::Fill(Vec::new(), None));
+    window.frames(3);
+    let drag = |window: &mut Window, from: f32, to: f32| {
+        let at = |y: f32| rect.lerp_inside(egui::vec2(0.5, y));
+        window.harness.drag_at(at(from));
+        window.frames(2);
+        for k in 1..=8 {
+            window.harness.hover_at(at(from + (to - from) * k as f32 / 8.0));
+            window.frame();
+        }
+        window.harness.drop_at(at(to));
+        window.frames(3);
+    };
+    let along = |window: &Window| -> f32 {
+        let field = window.harness.get_by_label("along from, 0 to 1");
+        field.accesskit_node().value().unwrap_or_default().parse().unwrap_or(f32::NAN)
+    };
+    drag(&mut window, 0.5, 0.7);
+    let low = along(&window);
+    drag(&mut window, 0.7, 0.3);
+    let high = along(&window);
+    assert!((0.0..1.0).contains(&low) && high > low + 0.1, "{low} {high}");
+}

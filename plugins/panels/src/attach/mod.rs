@@ -164,7 +164,7 @@ pub(crate) fn form(
         form.member.clone_from(&member.id);
     }
     ui.strong(tr!("to {}", scene.0.name_of(&form.member)));
-    ui.weak(tr!("A click on the member in the picture says where on it."));
+    ui.weak(tr!("A click on the member in the picture, or dragging along it, says where on it."));
     ui.horizontal_wrapped(|ui| {
         for (sort, name) in [
             (Sort::Finding, tr!("A finding")),

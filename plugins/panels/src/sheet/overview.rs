@@ -10,7 +10,10 @@ const WORST: usize = 8;
 
 pub(super) fn overview(ui: &mut Ui, scene: &Scene, latest: &Latest, actions: &mut Actions) {
     ui.label(RichText::new(&scene.name).heading().strong());
-    ui.weak(tr!("{} members", scene.members.len()));
+    ui.weak(match scene.members.len() {
+        1 => tr!("one member"),
+        count => tr!("{} members", count),
+    });
     ui.add_space(4.0);
     let known: Vec<usize> =
         (0..scene.members.len()).filter(|i| latest.member(*i).is_some()).collect();

@@ -52,9 +52,16 @@ impl Tape {
             painter.rect_filled(back, 3.0, Color32::from_black_alpha(190));
             painter.galley(back.min + vec2(4.0, 2.0), galley, Color32::WHITE);
         }
-        for end in seen {
-            painter.circle(end, 4.0, colours::SELECTED, (1.0, Color32::BLACK));
-        }
+        self.ends.iter().for_each(|at| end(ui, rect, camera, *at));
+    }
+}
+
+/// Marks a place.
+pub(super) fn end(ui: &Ui, rect: Rect, camera: &Camera, at: Vec3) {
+    if (at - camera.position).dot(camera.target - camera.position) > 0.0 {
+        let at = place(camera, rect, at);
+        let painter = ui.painter().with_clip_rect(rect);
+        painter.circle(at, 4.0, colours::SELECTED, (1.0, Color32::BLACK));
     }
 }
 

@@ -60,6 +60,8 @@ pub(crate) struct Structure {
     /// Where it is cut open.
     section: Option<Section>,
     tape: Tape,
+    /// Where on its member the evidence is that a form asks for.
+    place: Option<Vec3>,
     wished: Option<View>,
     /// Whether it is shown as it looks, not by its damage.
     is_lit: bool,
@@ -68,16 +70,32 @@ pub(crate) struct Structure {
 
 impl Default for Structure {
     fn default() -> Self {
-        let (model, tape) = (model::Model::default(), Tape::default());
-        let earlier = model::Model::earlier();
-        let (is_lit, settling) = (false, Settling::default());
-        Self { model, earlier, names: true, section: None, tape, wished: None, is_lit, settling }
+        Self {
+            model: model::Model::default(),
+            earlier: model::Model::earlier(),
+            names: true,
+            section: None,
+            tape: Tape::default(),
+            place: None,
+            wished: None,
+            is_lit: false,
+            settling: Settling::default(),
+        }
     }
 }
 
 impl Structure {
     pub(crate) fn look(&mut self, view: View) {
         self.wished = Some(view);
+    }
+
+    /// Where the evidence is that a form asks for.
+    fn put(&mut self, scene: &Scene, under: Option<Spot>, form: &mut Form) {
+        let spot = under.filter(|_| form.is_open);
+        if let Some((spot, member)) = spot.and_then(|s| Some((s, scene.members.get(s.member)?))) {
+            form.put_at(spot.along(member.frame), spot.face(member));
+            self.place = Some(spot.at);
+        }
     }
 
     /// The place on a member that is at a point of the window, while the picture is in sight.
@@ -154,6 +172,8 @@ pub(crate) fn structure(
             right
         }
     };
+    structure.model.slide(selection.0.filter(|_| form.is_open));
+    structure.place = structure.place.filter(|_| form.is_open);
     let pointed = structure.model.show(ui, rect, scene, &seen, scale, *selection, section, jobs);
     let Some(pointed) = pointed else { return };
     if is_lit {
@@ -170,6 +190,7 @@ pub(crate) fn structure(
     structure.earlier.follow(&pointed.camera);
     compass::draw(ui, rect, &pointed.camera);
     structure.tape.draw(ui, rect, &pointed.camera);
+    structure.place.iter().for_each(|at| measure::end(ui, rect, &pointed.camera, *at));
     let shown = Shown { latest: &latest, seen: &seen, when };
     point(structure, scene, &shown, pointed, form.bypass_change_detection(), &mut actions);
     let bar = Rect::from_min_size(whole.min + vec2(8.0, 8.0), vec2(whole.width() - 16.0, 24.0));
@@ -247,18 +268,16 @@ fn point(
     form: &mut Form,
     actions: &mut Actions,
 ) {
-    let model::Pointed { response, under, .. } = pointed;
+    let model::Pointed { response, under, slides, .. } = pointed;
+    if slides {
+        structure.put(scene, under, form);
+    }
     if response.clicked() {
         if structure.tape.is_on {
             under.iter().for_each(|spot| structure.tape.put(spot.at));
         } else {
             actions.ask(Action::Select(under.map(|spot| spot.member)));
-            if let Some((spot, member)) =
-                under.and_then(|s| Some((s, scene.members.get(s.member)?)))
-                && form.is_open
-            {
-                form.put_at(spot.along(member.frame), spot.face(member));
-            }
+            structure.put(scene, under, form);
         }
     }
     if response.double_clicked() && !structure.tape.is_on {
@@ -354,6 +373,11 @@ fn views(ui: &mut Ui, structure: &mut Structure, selection: Selection, actions: 
     let member = ui.add_enabled(selection.0.is_some(), egui::Button::new(tr!("Selected")));
     if member.on_hover_text(hint).clicked() {
         actions.ask(Action::Frame);
+    }
+    let mut is_parallel = structure.model.is_parallel();
+    let hint = tr!("From very far, so that parallels stay parallel, as in a drawing");
+    if ui.toggle_value(&mut is_parallel, tr!("Parallel")).on_hover_text(hint).changed() {
+        structure.model.narrow(is_parallel);
     }
     for (name, axis) in sides() {
         if ui.button(name).clicked() {

@@ -15,6 +15,7 @@ use crate::{
     lang::{fixed, local, term},
     moment::{Seen, place as place_of},
     number::plus_minus,
+    orbit,
     surface::{Drawn, Surface, bounds, draw, hand, place},
 };
 
@@ -33,6 +34,9 @@ const HATCH: usize = 9;
 /// Most names of members in the picture.
 const MOST_NAMES: usize = 40;
 
+/// Of the eye, and of one that is very far, degrees.
+const FOV: f32 = 32.0;
+const PARALLEL: f32 = 1.0;
 /// Pixels that are drawn within a frame.
 const COARSE: f64 = 4e5;
 
@@ -79,6 +83,8 @@ pub(super) struct Model {
     positions: Vec<Vec3>,
     camera: Option<Camera>,
     shown: Option<Shown>,
+    /// The member along which a place is dragged: there, the camera stays.
+    slides: Option<usize>,
     /// The fine picture that is being drawn, and what of.
     coming: Option<(Key, Task<Painted>)>,
 }
@@ -134,6 +140,8 @@ pub(super) struct Pointed {
     pub(super) under: Option<Spot>,
     /// Where it is looked from.
     pub(super) camera: Camera,
+    /// Whether it drags a place along the member.
+    pub(super) slides: bool,
 }
 
 impl Model {
@@ -183,7 +191,10 @@ impl Model {
             None => first(&self.positions, scene, [width, height]),
         };
         let before = camera.clone();
-        let camera = hand(ui, &response, rect, camera);
+        let begun = ui.input(|i| i.pointer.press_origin()).and_then(|at| self.spot(at));
+        let slides = response.dragged() && self.slides.is_some();
+        let slides = slides && begun.map(|spot| spot.member) == self.slides;
+        let camera = if slides { camera } else { hand(ui, &response, rect, camera) };
         let is_moving = response.dragged() || camera != before;
         self.camera = Some(camera.clone());
         let members = self.facets.iter().map(|f| f.member + 1).max().unwrap_or(0);
@@ -206,7 +217,7 @@ impl Model {
             legend(ui, rect, scale);
         }
         let under = response.hover_pos().and_then(|at| shown.spot(at));
-        Some(Pointed { response, under, camera })
+        Some(Pointed { response, under, camera, slides })
     }
 
     /// The place on a member that is at a point of the window.
@@ -222,6 +233,22 @@ impl Model {
     /// Looks from where another picture of the same structure is looked at from.
     pub(super) fn follow(&mut self, camera: &Camera) {
         self.camera = Some(camera.clone());
+    }
+
+    /// From now on a place is dragged along this member, or along none.
+    pub(super) fn slide(&mut self, along: Option<usize>) {
+        self.slides = along;
+    }
+
+    /// Whether it is looked at from very far.
+    pub(super) fn is_parallel(&self) -> bool {
+        self.camera.as_ref().is_some_and(|camera| camera.fov_deg < 0.5 * FOV)
+    }
+
+    /// From very far, or not.
+    pub(super) fn narrow(&mut self, is_parallel: bool) {
+        let fov = if is_parallel { PARALLEL } else { FOV };
+        self.camera = self.camera.as_ref().map(|camera| orbit::narrowed(camera, fov));
     }
 
     /// Corners of the box around the structure.
@@ -240,7 +267,8 @@ impl Model {
         let camera = self.camera.take().filter(|_| is_alike);
         let facets = Arc::new(facets);
         let (of, of_what) = (scene.hash.clone(), self.of_what);
-        *self = Self { of_what, of, facets, positions, camera, shown: None, coming: None };
+        let slides = self.slides;
+        *self = Self { of_what, of, facets, positions, camera, slides, ..Self::default() };
     }
 
     /// Looks from another place, so that what is wanted fills the picture.
@@ -512,7 +540,7 @@ fn first(positions: &[Vec3], scene: &Scene, [width, height]: [u32; 2]) -> Camera
         position,
         target: Vec3::ZERO,
         up: Vec3::Y,
-        fov_deg: 32.0,
+        fov_deg: FOV,
         width,
         height,
         exposure: 0.0,

@@ -61,7 +61,10 @@ impl Settling {
         let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
         let ink = Color32::from_white_alpha((255.0 * share) as u8);
         ui.painter().image(texture.id(), rect, whole, ink);
-        let said = tr!("light, a pixel ± {}", percent(noise));
+        let said = match noise.is_finite() {
+            true => tr!("light, a pixel ± {}", percent(noise)),
+            false => tr!("light is on its way"),
+        };
         let font = TextStyle::Small.resolve(ui.style());
         let at = rect.right_bottom() - vec2(10.0, 8.0);
         ui.painter().text(at, Align2::RIGHT_BOTTOM, said, font, Color32::from_gray(235));
