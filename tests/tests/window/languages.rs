@@ -10,7 +10,7 @@ use super::{Window, pictures::at_rest};
 
 /// What is the same word in German, or a name, or said so everywhere. *Close* are egui's own buttons
 /// of a window.
-const SAME: [&str; 10] = [
+const SAME: [&str; 11] = [
     "Close",
     "Close window",
     "Column 1",
@@ -18,6 +18,7 @@ const SAME: [&str; 10] = [
     "Language: Chinese",
     "Language: English",
     "Name",
+    "Parallel",
     "Primal",
     "Sprache: Deutsch",
     "⏸ Pause",
