@@ -46,7 +46,7 @@ use crate::{
 
 /// From the right rim of the window to where the form of evidence opens, points: beside the picture,
 /// in which one shows where it is.
-const FORM: f32 = 660.0;
+const FORM: f32 = 360.0;
 
 /// What is open.
 #[derive(Resource, Default)]

@@ -149,7 +149,8 @@ pub(crate) fn structure(
     // What is cut open, or compared, is not as it looks.
     let is_lit = structure.is_lit && section.is_none() && history.beside().is_none();
     let when = *moment;
-    let seen = if is_lit { Vec::new() } else { when.seen(scene, &latest, &courses) };
+    let seen = when.seen(scene, &latest, &courses);
+    let coloured = if is_lit { &[] } else { &seen[..] };
     let scale = match (is_lit, when.added && !when.is_now()) {
         (true, _) => Scale::NONE,
         (false, true) => Scale::ADDED,
@@ -174,7 +175,7 @@ pub(crate) fn structure(
     };
     structure.model.slide(selection.0.filter(|_| form.is_open));
     structure.place = structure.place.filter(|_| form.is_open);
-    let pointed = structure.model.show(ui, rect, scene, &seen, scale, *selection, section, jobs);
+    let pointed = structure.model.show(ui, rect, scene, coloured, scale, *selection, section, jobs);
     let Some(pointed) = pointed else { return };
     if is_lit {
         structure.settling.show(ui, rect, &pointed.camera, &mut light);
