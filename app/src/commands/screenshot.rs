@@ -41,15 +41,19 @@ fn take(session: &Session, args: &args::Screenshot) -> Result<Outcome, Failure> 
         wait: Duration::from_secs(args.wait),
         out: args.out.clone(),
     };
-    // Nothing of how the user has arranged his own window is in it, and nothing of it is changed.
     let language = match args.language {
         args::WindowLanguage::En => Language::English,
         args::WindowLanguage::De => Language::German,
         args::WindowLanguage::Zh => Language::Chinese,
     };
-    let (recent, layout, session_file) = (None, None, None);
-    let panels =
-        PanelsPlugin { recent, layout, session: session_file, language, ..PanelsPlugin::desktop() };
+    // Nothing of how the user has arranged his own window is in it, and nothing of it is changed.
+    let panels = PanelsPlugin {
+        recent: None,
+        layout: None,
+        session: None,
+        language,
+        ..PanelsPlugin::desktop()
+    };
     take_shot(super::view::builder(session, panels), shot)
         .map_err(|e| Failure::Internal(format!("no picture: {e:#}")))?;
     Ok(Outcome::Done)

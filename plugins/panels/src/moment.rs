@@ -4,14 +4,17 @@
 use std::sync::Arc;
 
 use bevy_ecs::prelude::*;
-use intrados_damage::{verdict::Basis, zone::ZONES};
+use intrados_damage::{
+    verdict::Basis,
+    zone::{self, ZONES},
+};
 use intrados_forecast::Passed;
 use intrados_mechanics::plugin::ShownAt;
 use intrados_predict::{MemberPrediction, Prediction};
-use intrados_scene::{Scene, structure::Date};
+use intrados_scene::{Scene, plugin::CurrentScene, structure::Date};
 use intrados_stage::time::{DAY, YEAR};
 
-use crate::Latest;
+use crate::{Latest, lang::term};
 
 /// Moments that are closer, years, are one.
 const SAME: f64 = 1.0 / 365.25;
@@ -88,7 +91,7 @@ impl Course {
 
 /// Where a zone is on its axis.
 pub(crate) fn place(zone: usize) -> String {
-    tr!("{} to {} %", 100 * zone / ZONES, 100 * (zone + 1) / ZONES)
+    term(&zone::place(zone))
 }
 
 /// All moments at which there is something to see, in years from now.
@@ -188,7 +191,7 @@ impl Courses {
 /// Keeps the lives and the moment in step with the prediction, and shows the surfaces of members as
 /// they are then.
 pub(crate) fn follow(
-    scene: Option<Res<intrados_scene::plugin::CurrentScene>>,
+    scene: Option<Res<CurrentScene>>,
     latest: Res<Latest>,
     mut courses: ResMut<Courses>,
     mut moment: ResMut<Moment>,
@@ -199,8 +202,7 @@ pub(crate) fn follow(
     if courses.timeline.range().is_none() {
         moment.set_if_neq(Moment::default());
     }
-    let is_now = moment.years.abs() < SAME;
-    let then = courses.age().map(|age| age + moment.years * YEAR).filter(|_| !is_now);
+    let then = courses.age().map(|age| age + moment.years * YEAR).filter(|_| !moment.is_now());
     at.set_if_neq(ShownAt(then));
 }
 

@@ -14,7 +14,7 @@ use intrados_transport::Side;
 use crate::{
     Action, Actions, Look, Quantity, Refine, Selection, Statistics, Viewpoint,
     fields::{self, Fields},
-    lang::{drag, fixed, local, term},
+    lang::{drag, fixed, local, slide, term},
     number::{count, duration, percent, plus_minus, significant},
     orbit,
     outline::Outline,
@@ -218,11 +218,7 @@ fn toolbar(
     });
     ui.horizontal(|ui| {
         let label = ui.label(tr!("Exposure|photo"));
-        let slider = egui::Slider::new(&mut new.exposure, -10.0..=10.0)
-            .suffix(" EV")
-            .fixed_decimals(1)
-            .custom_formatter(|stops, _| fixed(stops, 1))
-            .custom_parser(|text| text.trim().replace(',', ".").parse().ok());
+        let slider = slide(&mut new.exposure, -10.0..=10.0).suffix(" EV").fixed_decimals(1);
         ui.add(slider)
             .labelled_by(label.id)
             .on_hover_text(tr!("Develops the picture anew, and does not restart it"));

@@ -129,6 +129,12 @@ pub struct FaceSeen {
 }
 
 impl FaceSeen {
+    /// Whether enough of it is seen to say anything.
+    #[must_use]
+    pub fn is_seen(&self) -> bool {
+        self.seen >= GLIMPSE
+    }
+
     /// What is seen of all faces and what is not, one sentence.
     ///
     /// ```
@@ -140,14 +146,13 @@ impl FaceSeen {
     /// ```
     #[must_use]
     pub fn told(faces: &[Self]) -> String {
-        let is_seen = |f: &&Self| f.seen >= GLIMPSE;
-        let seen = faces.iter().filter(is_seen).map(|f| {
+        let seen = faces.iter().filter(|f| f.is_seen()).map(|f| {
             let limit =
                 f.narrowest_mm.map_or(String::new(), |mm| format!(" (cracks from {mm:.2} mm)"));
             format!("{:.0} % of {}{limit}", 100.0 * f.seen, f.face)
         });
         let hidden: Vec<&str> =
-            faces.iter().filter(|f| !is_seen(f)).map(|f| f.face.as_str()).collect();
+            faces.iter().filter(|f| !f.is_seen()).map(|f| f.face.as_str()).collect();
         let mut told: Vec<String> = seen.collect();
         if !hidden.is_empty() {
             told.push(format!("nothing of {}: what is there is unknown", hidden.join(", ")));

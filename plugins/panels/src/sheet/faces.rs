@@ -17,8 +17,6 @@ const HEIGHT: f32 = 150.0;
 const MARGIN: [f32; 2] = [34.0, 30.0];
 /// Most defects in the list.
 const MOST: usize = 24;
-/// Of a face of which less is seen nothing is.
-const GLIMPSE: f64 = 0.02;
 
 pub(super) fn faces(ui: &mut Ui, member: &Member, told: &MemberPrediction) {
     if !told.defects.is_empty() {
@@ -38,8 +36,7 @@ pub(super) fn faces(ui: &mut Ui, member: &Member, told: &MemberPrediction) {
 
 /// What photographs show of all faces and what they do not, one sentence.
 fn photographed(faces: &[FaceSeen]) -> String {
-    let (seen, hidden): (Vec<&FaceSeen>, Vec<&FaceSeen>) =
-        faces.iter().partition(|f| f.seen >= GLIMPSE);
+    let (seen, hidden): (Vec<&FaceSeen>, Vec<&FaceSeen>) = faces.iter().partition(|f| f.is_seen());
     let share = |f: &&FaceSeen| {
         let (percent, face) = (fixed(100.0 * f.seen, 0), term(&f.face));
         match f.narrowest_mm {
