@@ -1,6 +1,6 @@
 //! Renders what the network learns from, one file a lesson; goes on where it was stopped:
 //! `cargo run --release -p intrados-photo --example lessons -- FOLDER COUNT [FIRST] [SEED] [ORDERS]`,
-//! with 2 orders in direct light only.
+//! with 2 orders in direct light only, with 0 pasted: no light at all.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "an example for people")]
 

@@ -1202,14 +1202,16 @@ fn a_photograph_is_placed_by_its_corners_and_becomes_evidence() {
     let corners = site.surface(0).unwrap().outline().corners;
     assert_eq!(corners.len(), 8);
     let pose = Pose::of(&camera);
-    // Where it is moves as what is said of the picks grows.
+    let picks = |window: &Window| window.harness.query_all_by_label("✖").count();
     let pick = |window: &mut Window, k: usize, corner: glam::DVec3| {
         window.click(&format!("Corner {}", k + 1));
         let rect = window.harness.get_by_label("Photograph").rect();
         let scale = f64::from(rect.width().min(rect.height())) / 400.0;
         let [u, v] = pose.project(corner).unwrap();
         let to = egui::vec2((scale * (u - 200.0)) as f32, (scale * (v - 200.0)) as f32);
+        let before = picks(window);
         press(window, rect.center() + to);
+        assert_eq!(picks(window), before + 1, "corner {}", k + 1);
     };
     // The two at the back on the left are behind the pillar.
     let seen = |p: &glam::DVec3| p.z > 0.0 || p.x > 0.0;

@@ -12,7 +12,10 @@ use std::sync::Arc;
 
 use glam::{Vec2, Vec3, vec2};
 use intrados_scene::{Camera, Hit, Ray, tracer::Scratch};
-use intrados_stage::{Cancelled, Job, random::Key};
+use intrados_stage::{
+    Cancelled, Job,
+    random::{Draw, Key},
+};
 use intrados_transport::WalkRule;
 
 use crate::{LitScene, Render, RenderSettings, Sides, View, luminance};
@@ -23,6 +26,11 @@ const FINE: u32 = 3;
 pub const ORDERS: u32 = 4;
 /// Longest path of direct light: lamp, surface, camera.
 pub const DIRECT: u32 = 2;
+/// No light at all: the colours of things, and cracks as strokes of one darkness, as they are pasted
+/// on pictures of textures.
+pub const PASTED: u32 = 0;
+/// What is left of a face's colour where a crack is pasted on it, least and most.
+const STROKE: [f64; 2] = [0.1, 0.6];
 
 /// A square picture of a made-up face and what is to be seen in it.
 #[derive(Debug, Clone)]
@@ -67,7 +75,7 @@ pub struct CoursePoint {
 
 impl Patch {
     /// The patch of `key`, `size` pixels along a side, from `samples` walks a pixel, in light of at
-    /// most so many `orders` ([`ORDERS`], [`DIRECT`]). The same bits for any number of threads.
+    /// most so many `orders` ([`ORDERS`], [`DIRECT`], [`PASTED`]). The same bits for any number of threads.
     ///
     /// # Errors
     /// [`Cancelled`] soon after the job was.
@@ -80,28 +88,96 @@ impl Patch {
     ) -> Result<Self, Cancelled> {
         let scenery::Drawn { scene, camera, pixel, courses } = scenery::draw(key, size);
         let lit = Arc::new(LitScene::build(Arc::new(scene), job)?);
-        let settings = RenderSettings {
-            sides: Sides::Primal,
-            rule: WalkRule {
-                max_order: orders,
-                alike: u64::from(size) * u64::from(size),
-                ..WalkRule::default()
-            },
-            seed: u64::from(key.0) << 32 | u64::from(key.1),
-            samples: Some(samples),
-            orders: false,
-            ..RenderSettings::default()
-        };
-        let mut render = Render::new(Arc::clone(&lit), &camera, &settings);
-        while render.advance(16) {
-            job.step(0, 1)?;
-        }
-        let mut radiance = render.image(View::Primal, None).mean;
-        expose(&mut radiance);
         let labels = labels(&lit, &camera);
         let courses = courses.iter().map(|line| seen(&lit, &camera, line)).collect();
+        let mut radiance = match orders {
+            PASTED => {
+                let [least, most] = STROKE;
+                let stroke = Draw::new(key.split(9, 0)).log_between(least, most);
+                pasted(&lit, &camera, stroke as f32)
+            }
+            _ => walked(&lit, &camera, key, samples, orders, job)?,
+        };
+        expose(&mut radiance);
         Ok(Self { size, pixel, radiance, labels, courses })
     }
+}
+
+/// Radiance by walks in light of at most so many `orders`.
+fn walked(
+    lit: &Arc<LitScene>,
+    camera: &Camera,
+    key: Key,
+    samples: u64,
+    orders: u32,
+    job: &Job,
+) -> Result<Vec<Vec3>, Cancelled> {
+    let settings = RenderSettings {
+        sides: Sides::Primal,
+        rule: WalkRule {
+            max_order: orders,
+            alike: u64::from(camera.width) * u64::from(camera.height),
+            ..WalkRule::default()
+        },
+        seed: u64::from(key.0) << 32 | u64::from(key.1),
+        samples: Some(samples),
+        orders: false,
+        ..RenderSettings::default()
+    };
+    let mut render = Render::new(Arc::clone(lit), camera, &settings);
+    while render.advance(16) {
+        job.step(0, 1)?;
+    }
+    Ok(render.image(View::Primal, None).mean)
+}
+
+/// The colours of things, a crack as `stroke` of its own.
+fn pasted(lit: &LitScene, camera: &Camera, stroke: f32) -> Vec<Vec3> {
+    let colour = |hit: &Hit, ray: &Ray| {
+        if !hit.is_hit() {
+            return Vec3::ONE;
+        }
+        let own = lit.scene.materials[lit.object(hit.triangle).material].base_colour;
+        let seen = lit.appearance(hit.triangle, ray_end(ray, hit)).map_or(own, |a| a.colour);
+        match What::of(&lit.object(hit.triangle).name) {
+            What::Crack => stroke * seen,
+            _ => seen,
+        }
+    };
+    by_pixel(lit, camera, |hits, rays| {
+        let sum: Vec3 = hits.iter().zip(rays).map(|(hit, ray)| colour(hit, ray)).sum();
+        sum / hits.len() as f32
+    })
+}
+
+fn ray_end(ray: &Ray, hit: &Hit) -> Vec3 {
+    Vec3::from(ray.origin) + hit.t * Vec3::from(ray.direction)
+}
+
+/// Of each pixel, row-major from the top left, what [`FINE`]² rays through it tell.
+fn by_pixel<T>(
+    lit: &LitScene,
+    camera: &Camera,
+    mut tell: impl FnMut(&[Hit], &[Ray]) -> T,
+) -> Vec<T> {
+    let mut scratch = Scratch::default();
+    let mut pixels = Vec::with_capacity((camera.width * camera.height) as usize);
+    for y in 0..camera.height {
+        let offset = |k: u32| (k as f32 + 0.5) / FINE as f32;
+        let rays: Vec<Ray> = (0..camera.width)
+            .flat_map(|x| {
+                (0..FINE * FINE).map(move |k| {
+                    let (x, y) = (x as f32 + offset(k % FINE), y as f32 + offset(k / FINE));
+                    Ray::new(camera.position, camera.direction(x, y), f32::INFINITY)
+                })
+            })
+            .collect();
+        let mut hits = vec![Hit::MISS; rays.len()];
+        lit.tracer.closest(&rays, &mut hits, &mut scratch);
+        let pixel = (FINE * FINE) as usize;
+        pixels.extend(hits.chunks(pixel).zip(rays.chunks(pixel)).map(|(h, r)| tell(h, r)));
+    }
+    pixels
 }
 
 /// As a camera's automatic exposure does: a tenth of the pixels becomes brighter than 1.
@@ -138,45 +214,28 @@ fn labels(lit: &LitScene, camera: &Camera) -> Vec<Label> {
     let what: Vec<What> = lit.scene.objects.iter().map(|o| What::of(&o.name)).collect();
     let stained =
         lit.scene.materials.iter().any(|m| m.finish.as_ref().is_some_and(|f| f.is_stained()));
-    let mut scratch = Scratch::default();
-    let mut labels = Vec::with_capacity((camera.width * camera.height) as usize);
-    for y in 0..camera.height {
-        let offset = |k: u32| (k as f32 + 0.5) / FINE as f32;
-        let rays: Vec<Ray> = (0..camera.width)
-            .flat_map(|x| {
-                (0..FINE * FINE).map(move |k| {
-                    let (x, y) = (x as f32 + offset(k % FINE), y as f32 + offset(k / FINE));
-                    Ray::new(camera.position, camera.direction(x, y), f32::INFINITY)
-                })
-            })
-            .collect();
-        let mut hits = vec![Hit::MISS; rays.len()];
-        lit.tracer.closest(&rays, &mut hits, &mut scratch);
-        let pixel = (FINE * FINE) as usize;
-        labels.extend(hits.chunks(pixel).zip(rays.chunks(pixel)).map(|(hits, rays)| {
-            let share = |wanted: &[What]| {
-                let of = |hit: &&Hit| {
-                    hit.is_hit() && wanted.contains(&what[lit.object_index(hit.triangle) as usize])
-                };
-                hits.iter().filter(of).count() as f32 / pixel as f32
+    by_pixel(lit, camera, |hits, rays| {
+        let share = |wanted: &[What]| {
+            let of = |hit: &&Hit| {
+                hit.is_hit() && wanted.contains(&what[lit.object_index(hit.triangle) as usize])
             };
-            let mut label = Label {
-                crack: share(&[What::Crack]),
-                spall: share(&[What::Spall, What::Steel]),
-                steel: share(&[What::Steel]),
-                ..Label::default()
-            };
-            let (hit, ray) = (hits[pixel / 2], rays[pixel / 2]);
-            if stained && hit.is_hit() {
-                let place = Vec3::from(ray.origin) + hit.t * Vec3::from(ray.direction);
-                if let Some(face) = lit.appearance(hit.triangle, place) {
-                    (label.rust, label.efflorescence) = (face.rust, face.efflorescence);
-                }
-            }
-            label
-        }));
-    }
-    labels
+            hits.iter().filter(of).count() as f32 / hits.len() as f32
+        };
+        let mut label = Label {
+            crack: share(&[What::Crack]),
+            spall: share(&[What::Spall, What::Steel]),
+            steel: share(&[What::Steel]),
+            ..Label::default()
+        };
+        let (hit, ray) = (hits[hits.len() / 2], rays[rays.len() / 2]);
+        if stained
+            && hit.is_hit()
+            && let Some(face) = lit.appearance(hit.triangle, ray_end(&ray, &hit))
+        {
+            (label.rust, label.efflorescence) = (face.rust, face.efflorescence);
+        }
+        label
+    })
 }
 
 /// A line on the face as the camera sees it.
@@ -212,6 +271,16 @@ mod tests {
         assert_eq!(a.radiance, again.radiance);
         assert_eq!(a.labels, again.labels);
         assert_ne!(a.radiance, b.radiance);
+    }
+
+    /// What is pasted is lit by nothing, and has the same labels.
+    #[test]
+    fn pasted_patches_have_the_labels_of_lit_ones() {
+        let pasted = Patch::render(Key::new(3, 0), 64, 2, PASTED, &Job::default()).unwrap();
+        let lit = patch(3);
+        assert_eq!(pasted.labels, lit.labels);
+        assert_ne!(pasted.radiance, lit.radiance);
+        assert!(pasted.radiance.iter().all(|c| c.is_finite() && c.min_element() >= 0.0));
     }
 
     /// Where a label says crack, a course passes: half the crack's width, its unevenness, and a

@@ -8,7 +8,7 @@ mod work;
 use std::{path::PathBuf, sync::Arc};
 
 use bevy_ecs::prelude::*;
-use egui::{ComboBox, Rect, ScrollArea, TextureHandle, TextureOptions, Ui, pos2};
+use egui::{ComboBox, Rect, ScrollArea, TextureHandle, TextureOptions, Ui, pos2, vec2};
 use glam::DVec3;
 use intrados_photo::{ByEdges, Located, Pick};
 use intrados_scene::{Member, Scene, plugin::CurrentScene, structure::Photographed};
@@ -30,6 +30,8 @@ const FEWEST: usize = 4;
 /// From so far a find is looked at in the model, m.
 const NEAR: f64 = 1.2;
 
+/// Lines that what is told of its place has; more of them are scrolled to.
+const TOLD: f32 = 5.0;
 /// So many changes of picks can be taken back.
 const MOST: usize = 64;
 
@@ -404,7 +406,14 @@ fn aside(
         *armed = Some(corner);
         *face = None;
     }
-    stand(ui, shot, actions, viewpoint);
+    // Of one height whatever is told: what stands below is clicked while a place is computed, and
+    // must not move away under the click.
+    let told = vec2(ui.available_width(), TOLD * ui.text_style_height(&egui::TextStyle::Body));
+    ui.allocate_ui(told, |ui| {
+        ScrollArea::vertical().id_salt("photo stand").auto_shrink(false).show(ui, |ui| {
+            stand(ui, shot, actions, viewpoint);
+        });
+    });
     ui.horizontal_wrapped(|ui| {
         let is_placed = shot.located().is_some();
         if let Some(task) = &shot.reading {

@@ -330,7 +330,8 @@ pub struct Photo {
     /// Path, relative to this file: JPEG, PNG or TIFF.
     pub file: String,
     /// Table of picks (CSV), relative to this file: `u`, `v` in pixels of the upright photograph
-    /// and `x`, `y`, `z` in m, or `member`, `corner`.
+    /// and `x`, `y`, `z` in m, or `member`, `corner`; of a tag that is stuck on (AprilTag 36h11)
+    /// `tag`, `size_mm`, `member`, `face`, `along`, `across_mm`, `turn_deg`.
     pub picks: String,
     /// Id of the member.
     pub member: String,
