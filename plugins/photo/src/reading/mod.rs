@@ -22,7 +22,7 @@ use crate::{
 };
 use course::{Line, lines};
 use returned::{Opened, USUAL, returned};
-use width::{Piece, SHOWS, pieces, scatter};
+use width::{FOUND, Piece, SHOWS, blur, pieces, scatter};
 
 pub use defect::{Crack, CrackPoint, Defect, Patch};
 
@@ -47,7 +47,7 @@ pub struct FaceReading {
     /// By tenth of the axis from its start, m² of the face of which the reflectance is known: of
     /// all else nothing is said.
     pub seen_m2: [f64; PARTS],
-    /// The narrowest crack that takes away three standard errors of light over 16 pixels of its
+    /// The narrowest crack that takes away four standard errors of light over 16 pixels of its
     /// length, mm: of narrower ones nothing is said. None where too little is seen to tell.
     pub narrowest_mm: Option<f64>,
     /// Millimetres a pixel of the map that was read.
@@ -146,21 +146,27 @@ pub fn read(
     let value = light.map(|c| c.element_sum() / 3.0);
     let marks = marks(&light, &known, job)?;
     let lines = lines(&marks.cracks());
-    let scatter = scatter(&value, &lines);
+    let blur = blur(&value, &lines);
+    let scatter = scatter(&value, &lines, blur);
     let face = Face { site, seen, map, surface: site.surface(seen.member) };
-    let shown = shown(&value, lines, scatter);
+    let shown = shown(&value, lines, blur, scatter);
     let mut defects = face.cracks(&shown, scatter, under, job)?;
     net(&mut defects);
     defects.extend(face.patches(&marks));
     let mm_px = map.face.mm_px;
-    let narrowest_mm = scatter.map(|s| SHOWS * s * mm_px / (1.0 - USUAL[0]));
+    let narrowest_mm = scatter.map(|s| FOUND * s * mm_px / (1.0 - USUAL[0]));
     Ok(FaceReading { defects, seen_m2: face.seen(&known), narrowest_mm, mm_px })
 }
 
 /// Lines of which enough light is missing, with their pieces.
-fn shown(value: &Grid<f32>, lines: Vec<Line>, scatter: Option<f64>) -> Vec<(Line, Vec<Piece>)> {
+fn shown(
+    value: &Grid<f32>,
+    lines: Vec<Line>,
+    blur: f64,
+    scatter: Option<f64>,
+) -> Vec<(Line, Vec<Piece>)> {
     let measured = |line: Line| {
-        let pieces = pieces(value, &line);
+        let pieces = pieces(value, &line, blur);
         (line, pieces)
     };
     let shows = |(_, pieces): &(Line, Vec<Piece>)| {
@@ -247,10 +253,7 @@ impl Face<'_> {
             let own = scatter / (count.max(1) as f64).sqrt() * mm_px / (1.0 - r[0]);
             [w.max(0.0), own.hypot(w * r[1] / (1.0 - r[0])).hypot(w * scale)]
         };
-        let by_point = |k: usize| {
-            let piece = pieces.iter().find(|p| (p.points[0]..=p.points[1]).contains(&k))?;
-            Some(width(piece.missing, 1))
-        };
+        let by_point = |k: usize| missing_at(pieces, k).map(|missing| width(missing, 1));
         let last = line.points.len() - 1;
         let written = (0..=last).filter(|k| k % EVERY == 0 || *k == last);
         let points = written
@@ -337,6 +340,19 @@ impl Face<'_> {
         }
         seen
     }
+}
+
+/// Light that is missing at a point of a line, pixels: between the middles of its pieces, which are
+/// straight where cracks taper. None where its piece is not seen.
+fn missing_at(pieces: &[Piece], k: usize) -> Option<f64> {
+    let own = pieces.iter().position(|p| (p.points[0]..=p.points[1]).contains(&k))?;
+    let middle = |p: &Piece| 0.5 * (p.points[0] + p.points[1]) as f64;
+    let at = k as f64;
+    let next = if at < middle(&pieces[own]) { own.checked_sub(1) } else { Some(own + 1) };
+    let (a, b) = (&pieces[own], next.and_then(|n| pieces.get(n)).unwrap_or(&pieces[own]));
+    let span = middle(b) - middle(a);
+    let t = if span == 0.0 { 0.0 } else { (at - middle(a)) / span };
+    Some(a.missing + t * (b.missing - a.missing))
 }
 
 fn mean(of: impl Iterator<Item = f64>) -> Option<f64> {

@@ -10,9 +10,9 @@ use intrados_scene::{
 };
 use intrados_stage::{Cancelled, Job};
 
-/// r of a crack: about what a slot of some 20 widths' depth in concrete returns under an even sky,
-/// where no walks can tell (ours).
-pub(super) const USUAL: [f64; 2] = [0.12, 0.08];
+/// r of a crack where no walks can tell: a slot of some 20 widths' depth in clean concrete returns
+/// .12 to .2 under an even sky, and one with black walls nothing (ours).
+pub(super) const USUAL: [f64; 2] = [0.08, 0.05];
 /// How deep cracks may be, in widths, but for the finest crazing (ours): what is between is open.
 const DEPTHS: [f32; 2] = [12.0, 60.0];
 /// Cracks whose r is computed; others have the mean of these.
@@ -71,8 +71,16 @@ pub(super) fn returned(
         }
     }
     let known: Vec<f64> = found.iter().filter_map(|r| mean(r)).collect();
-    let others = mean(&known).map_or(USUAL, |r| [r, USUAL[1]]);
-    Ok(found.iter().map(|r| mean(r).map_or(others, |m| [m, spread(r, m)])).collect())
+    let others = mean(&known).map_or(USUAL, |r| soiled([r, USUAL[1]]));
+    Ok(found.iter().map(|r| mean(r).map_or(others, |m| soiled([m, spread(r, m)]))).collect())
+}
+
+/// What walks tell is the most that a slot returns: its walls are as pale as the face in them, while
+/// dust, damp and roughness make them darker, nobody knows by how much. Anything from nothing to
+/// that is as likely (ours), so that the middle is taken and its error grows by that of a uniform
+/// distribution.
+fn soiled([r, error]: [f64; 2]) -> [f64; 2] {
+    [0.5 * r, (0.5 * error).hypot(r / 12_f64.sqrt())]
 }
 
 fn mean(of: &[f64]) -> Option<f64> {

@@ -1,29 +1,40 @@
 //! Widths of cracks, also of those narrower than a pixel: the light that is missing across.
 //!
 //! D = ∫ (1 − y/y₀) ds = w (1 − r): blur moves light about and changes nothing of D; y₀ is what the
-//! concrete beside would show, r what the slot returns of it (theory §8). How much light is missing
-//! where there is no crack tells D's error, texture and all; a crack shows where D is several of
-//! these.
+//! concrete beside would show, r what the slot returns of it (theory §8). A slot that is blurred as
+//! the picture is has one shape for each D: fitted to the cuts across a crack it leaves out what
+//! texture does beside the slot, which a sum over the cut would take in. How much light is missing
+//! where there is no crack tells D's error, texture and all.
 
 use intrados_raster::Grid;
 use intrados_stage::random::Key;
+use statrs::function::erf::erf;
 
-use super::course::Line;
+use super::{course::Line, returned::USUAL};
 
 /// Pixels of a line whose missing light is taken together.
 pub(super) const PIECE: usize = 16;
-/// Beyond the mouth's half width, pixels: blur of lens and map within which light is missing.
-const BLUR: f64 = 2.5;
-/// Pixels on either side that tell what the concrete beside would show.
+/// Pixels on either side of the mouth that tell what the concrete beside would show.
 const BESIDE: f64 = 5.0;
 /// Steps along a cut, pixels.
 const STEP: f64 = 0.5;
+/// Steps of missing light that are tried, pixels, and the least: texture may also be bright.
+const TRY: f64 = 0.1;
+const LEAST: f64 = -2.0;
+/// Blurs that are tried, pixels (deviation of a Gaussian), and the one of most sharp pictures.
+const BLURS: [f64; 12] = [0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.15, 1.35, 1.6, 1.9, 2.3, 2.8];
+pub(super) const SHARP: f64 = 0.85;
+/// Pieces that tell the blur: at least, and at most as many as it takes.
+const TELL: [usize; 2] = [4, 80];
 /// Places without cracks that are tried for the scatter of a face.
 const TRIED: u32 = 400;
 /// Fewest of these.
 const FEWEST: usize = 16;
 /// A crack shows where it takes away so many standard errors of light.
 pub(super) const SHOWS: f64 = 3.0;
+/// Where it takes away so many in a piece, the network finds it, too: 97 % of their length in
+/// rendered photographs that this was chosen on.
+pub(super) const FOUND: f64 = 4.0;
 
 /// A piece of a crack.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,29 +45,36 @@ pub(super) struct Piece {
     pub(super) missing: f64,
 }
 
-/// Pieces of a line whose two sides are seen.
-pub(super) fn pieces(value: &Grid<f32>, line: &Line) -> Vec<Piece> {
-    let last = line.points.len().saturating_sub(1);
-    let one = |first: usize| {
-        let end = (first + PIECE - 1).min(last);
-        let cuts = (first..=end).filter_map(|k| {
-            let across = across(line, k)?;
-            missing(value, line.points[k], across, line.half[k])
-        });
-        let cuts: Vec<f64> = cuts.collect();
-        // Of half of it at least.
-        let known = 2 * cuts.len() > end - first;
-        known.then(|| Piece { points: [first, end], missing: midmean(cuts) })
-    };
-    (0..last).step_by(PIECE).filter_map(one).collect()
+/// Pieces of a line whose two sides are seen, in a picture of this blur.
+pub(super) fn pieces(value: &Grid<f32>, line: &Line, blur: f64) -> Vec<Piece> {
+    let piece =
+        |(points, cut): ([usize; 2], Cut)| Some(Piece { points, missing: cut.slot(blur)?.missing });
+    cuts(value, line).filter_map(piece).collect()
 }
 
-/// The mean of the middle third: a pore on the line or a stone beside it is in some of the cuts and
-/// would else count by its area.
-fn midmean(mut cuts: Vec<f64>) -> f64 {
-    cuts.sort_by(f64::total_cmp);
-    let middle = &cuts[cuts.len() / 3..cuts.len() - cuts.len() / 3];
-    middle.iter().sum::<f64>() / middle.len() as f64
+/// The blur of a picture, pixels, by the shape of its cracks: the one with which the slots leave
+/// least of the cuts unexplained, each by its own scatter.
+pub(super) fn blur(value: &Grid<f32>, lines: &[Line]) -> f64 {
+    let all: Vec<Cut> = lines.iter().flat_map(|line| cuts(value, line)).map(|c| c.1).collect();
+    if all.len() < TELL[0] {
+        return SHARP;
+    }
+    let some = || all.iter().step_by(all.len().div_ceil(TELL[1]));
+    let left = |blur: f64| -> f64 {
+        some().filter_map(|cut| cut.slot(blur)).map(|slot| slot.left.max(1e-12).ln()).sum()
+    };
+    BLURS.into_iter().min_by(|a, b| left(*a).total_cmp(&left(*b))).unwrap_or(SHARP)
+}
+
+/// Cuts across a line's pieces, with the first and last point of each.
+fn cuts(value: &Grid<f32>, line: &Line) -> impl Iterator<Item = ([usize; 2], Cut)> {
+    let last = line.points.len().saturating_sub(1);
+    (0..last).step_by(PIECE).filter_map(move |first| {
+        let end = (first + PIECE - 1).min(last);
+        let half = line.half[first..=end].iter().copied().fold(1.0, f64::max);
+        let places = (first..=end).filter_map(|k| Some((line.points[k], across(line, k)?)));
+        Some(([first, end], Cut::of(value, places, half)?))
+    })
 }
 
 /// Unit, across the line at one of its points.
@@ -67,29 +85,86 @@ fn across(line: &Line, k: usize) -> Option<[f64; 2]> {
     (length > 0.0).then(|| [-e / length, d / length])
 }
 
-/// Light missing on a cut, pixels; `None` where one of its sides is not seen.
-fn missing(value: &Grid<f32>, at: [f64; 2], across: [f64; 2], half: f64) -> Option<f64> {
-    // The mask is a pixel and a half wide on either side of the narrowest crack.
-    let inner = BLUR + half.max(1.0);
-    let outer = inner + BESIDE;
-    let on = |s: f64| sampled(value, [at[0] + s * across[0], at[1] + s * across[1]]);
-    let steps = (outer / STEP) as i32;
-    let cut: Vec<(f64, f64)> = (-steps..=steps)
-        .map(|k| f64::from(k) * STEP)
-        .map(|s| Some((s, on(s)?)))
-        .collect::<Option<_>>()?;
-    // A straight line through both sides: light falls off slowly across a face.
-    let (mut n, mut sum, mut moment, mut square) = (0.0, 0.0, 0.0, 0.0);
-    for (s, y) in cut.iter().filter(|(s, _)| s.abs() > inner) {
-        (n, sum, moment, square) = (n + 1.0, sum + y, moment + s * y, square + s * s);
+/// Light across a piece of a line.
+struct Cut {
+    /// Pixels from the line, and the light there.
+    light: Vec<[f64; 2]>,
+    /// Most that may be missing, pixels.
+    most: f64,
+}
+
+/// What explains a cut.
+struct Slot {
+    /// Pixels of light.
+    missing: f64,
+    /// Sum of what is left of the cut, squared, over the square of the light beside.
+    left: f64,
+}
+
+impl Cut {
+    /// The middle of many cuts, where at least half of them are seen: by place the mean of their
+    /// middle half, since a pore on the line or a stone beside it is in some of them.
+    fn of(
+        value: &Grid<f32>,
+        places: impl Iterator<Item = ([f64; 2], [f64; 2])>,
+        half: f64,
+    ) -> Option<Self> {
+        let steps = ((half + BESIDE) / STEP) as i32;
+        let along = || (-steps..=steps).map(|k| f64::from(k) * STEP);
+        let (mut rows, mut count) = (Vec::<Vec<f64>>::new(), 0);
+        for (at, across) in places {
+            count += 1;
+            let on = |s: f64| sampled(value, [at[0] + s * across[0], at[1] + s * across[1]]);
+            rows.extend(along().map(on).collect::<Option<_>>());
+        }
+        if 2 * rows.len() <= count {
+            return None;
+        }
+        let middle = |k: usize| {
+            let mut all: Vec<f64> = rows.iter().map(|row| row[k]).collect();
+            all.sort_by(f64::total_cmp);
+            let half = &all[all.len() / 4..all.len() - all.len() / 4];
+            half.iter().sum::<f64>() / half.len() as f64
+        };
+        let light = along().enumerate().map(|(k, s)| [s, middle(k)]).collect();
+        Some(Self { light, most: 2.0 * (half + 2.0) })
     }
-    let (level, slope) = (sum / n, moment / square);
-    let inside = cut.iter().filter(|(s, _)| s.abs() <= inner);
-    let lacks = |(s, y): &(f64, f64)| {
-        let beside = level + slope * s;
-        if beside > 0.0 { STEP * (1.0 - y / beside) } else { 0.0 }
-    };
-    (level > 0.0).then(|| inside.map(lacks).sum())
+
+    /// The slot that explains it best.
+    fn slot(&self, blur: f64) -> Option<Slot> {
+        let count = ((self.most - LEAST) / TRY) as usize;
+        let missing = |k: usize| LEAST + k as f64 * TRY;
+        let left: Vec<f64> = (0..=count).map(|k| self.left(missing(k), blur)).collect();
+        let k = (1..count).min_by(|a, b| left[*a].total_cmp(&left[*b]))?;
+        // The lowest point of the parabola through three tries.
+        let bend = left[k - 1] - 2.0 * left[k] + left[k + 1];
+        let beside = if bend > 0.0 { 0.5 * (left[k - 1] - left[k + 1]) / bend } else { 0.0 };
+        let level = self.light.iter().map(|l| l[1]).sum::<f64>() / self.light.len() as f64;
+        let left = left[k] / (level * level);
+        (level > 0.0).then(|| Slot { missing: missing(k) + beside.clamp(-1.0, 1.0) * TRY, left })
+    }
+
+    /// What y = (a + b s) q(s) leaves of the cut, squared, by its best a and b: a straight line,
+    /// since light falls off slowly across a face, times what the slot lets by.
+    fn left(&self, missing: f64, blur: f64) -> f64 {
+        let (mut m, mut rhs, mut all) = ([0.0; 3], [0.0; 2], 0.0);
+        for &[s, y] in &self.light {
+            let q = 1.0 - taken(s, missing, blur);
+            (m[0], m[1], m[2]) = (m[0] + q * q, m[1] + q * q * s, m[2] + q * q * s * s);
+            (rhs[0], rhs[1], all) = (rhs[0] + q * y, rhs[1] + q * y * s, all + y * y);
+        }
+        let det = m[0] * m[2] - m[1] * m[1];
+        let [a, b] = [m[2] * rhs[0] - m[1] * rhs[1], m[0] * rhs[1] - m[1] * rhs[0]];
+        all - (a * rhs[0] + b * rhs[1]) / det
+    }
+}
+
+/// Share of the light that a blurred slot takes away, `s` pixels from its middle: a box as deep as
+/// slots are in most light, as wide as `missing` wants, under a Gaussian.
+fn taken(s: f64, missing: f64, blur: f64) -> f64 {
+    let depth = 1.0 - USUAL[0];
+    let (half, scale) = (0.5 * missing / depth, blur * std::f64::consts::SQRT_2);
+    0.5 * depth * (erf((s + half) / scale) - erf((s - half) / scale))
 }
 
 /// Between pixels' middles; `None` where any of the four is not known.
@@ -111,9 +186,9 @@ fn sampled(value: &Grid<f32>, [x, y]: [f64; 2]) -> Option<f64> {
 
 /// Standard error of a piece's missing light, pixels: how much is missing along straight pieces
 /// where no crack was found (robust). `None` where too few places are seen.
-pub(super) fn scatter(value: &Grid<f32>, lines: &[Line]) -> Option<f64> {
+pub(super) fn scatter(value: &Grid<f32>, lines: &[Line], blur: f64) -> Option<f64> {
     let mut taken = Grid::new(value.width, value.height, false);
-    let reach = (2.0 * BLUR + BESIDE) as isize;
+    let reach = (2.0 * BESIDE) as isize;
     for p in lines.iter().flat_map(|line| line.points.iter().step_by(4)) {
         for (dx, dy) in (-reach..=reach).flat_map(|dx| (-reach..=reach).map(move |dy| (dx, dy))) {
             let place =
@@ -133,12 +208,11 @@ pub(super) fn scatter(value: &Grid<f32>, lines: &[Line]) -> Option<f64> {
         if taken.data[middle] {
             return None;
         }
-        let cut = |j: usize| {
+        let places = (0..PIECE).map(|j| {
             let s = j as f64 - 0.5 * PIECE as f64;
-            missing(value, [at[0] + s * cos, at[1] + s * sin], [-sin, cos], 1.0)
-        };
-        let cuts: Vec<f64> = (0..PIECE).map(cut).collect::<Option<_>>()?;
-        Some(midmean(cuts))
+            ([at[0] + s * cos, at[1] + s * sin], [-sin, cos])
+        });
+        Some(Cut::of(value, places, 1.0)?.slot(blur)?.missing)
     };
     if value.data.is_empty() {
         return None;
@@ -192,7 +266,8 @@ mod tests {
         for width in [0.25, 0.5, 1.0, 2.0] {
             for blur in [0.5, 0.8, 1.2] {
                 let (value, line) = drawn(width, blur, 0.0);
-                let pieces = pieces(&value, &line);
+                let sharp = super::blur(&value, std::slice::from_ref(&line));
+                let pieces = pieces(&value, &line, sharp);
                 assert!(pieces.len() >= 8);
                 let mean = pieces.iter().map(|p| p.missing).sum::<f64>() / pieces.len() as f64;
                 assert!(
@@ -215,8 +290,10 @@ mod tests {
                 }
             }
         }
-        let worst =
-            pieces(&value, &line).iter().map(|p| (p.missing - 0.45).abs()).fold(0.0, f64::max);
+        let worst = pieces(&value, &line, SHARP)
+            .iter()
+            .map(|p| (p.missing - 0.45).abs())
+            .fold(0.0, f64::max);
         assert!(worst < 0.1, "{worst} of .45 pixels; their mean would be off by a whole one");
     }
 
@@ -224,9 +301,9 @@ mod tests {
     #[test]
     fn errors_are_as_large_as_the_scatter_says() {
         let (value, line) = drawn(0.4, 0.8, 0.03);
-        let error = scatter(&value, std::slice::from_ref(&line)).unwrap();
+        let error = scatter(&value, std::slice::from_ref(&line), SHARP).unwrap();
         let z: Vec<f64> =
-            pieces(&value, &line).iter().map(|p| (p.missing - 0.36) / error).collect();
+            pieces(&value, &line, SHARP).iter().map(|p| (p.missing - 0.36) / error).collect();
         let rms = (z.iter().map(|z| z * z).sum::<f64>() / z.len() as f64).sqrt();
         assert!((0.4..2.0).contains(&rms), "{rms} with {error}");
         assert!(error < 0.1, "{error}");
