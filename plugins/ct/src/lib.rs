@@ -8,6 +8,7 @@ pub mod network;
 pub mod normal;
 pub mod outline;
 pub mod picture;
+pub mod probe;
 pub mod score;
 mod settings;
 pub mod slice;

@@ -370,5 +370,9 @@ fn dismiss(world: &mut World) {
     {
         return;
     }
+    // A tool over slices that are seen goes before the selection that they are of.
+    if world.resource::<Desk>().place("CT").is_some() && world.resource_mut::<Ct>().end_tool() {
+        return;
+    }
     world.resource_mut::<Selection>().set_if_neq(Selection(None));
 }

@@ -27,6 +27,8 @@ pub enum Taken {
     Report,
     /// One table of the prediction, by its name.
     Table(&'static str),
+    /// Values that a panel shows: what they are called, and themselves as CSV.
+    Values(&'static str, String),
     /// A panel as it is seen, with its legend; none: the whole window.
     Picture(Option<String>),
 }
@@ -57,7 +59,7 @@ impl Saving {
         let name = file_name(scene);
         self.path = match &what {
             Taken::Report => format!("{name}-damage"),
-            Taken::Table(table) => format!("{name}-{table}.csv"),
+            Taken::Table(table) | Taken::Values(table, _) => format!("{name}-{table}.csv"),
             Taken::Picture(_) => format!("{name}.png"),
         };
         self.shown = Some(what);
@@ -150,7 +152,9 @@ pub(crate) fn sheet(
         Taken::Report => {
             tr!("HTML, BCF, tables and models, as `intrados predict --out` writes them.")
         }
-        Taken::Table(name) => tr!("The table of {}: UTF-8, units in the header.", term(name)),
+        Taken::Table(name) | Taken::Values(name, _) => {
+            tr!("The table of {}: UTF-8, units in the header.", term(name))
+        }
         Taken::Picture(_) => tr!("PNG, as it is seen now."),
     });
     ui.horizontal(|ui| {
@@ -169,7 +173,7 @@ pub(crate) fn sheet(
         }
     }
     let result = latest.result_for(&scene.0).cloned();
-    let needs = !matches!(what, Taken::Picture(_));
+    let needs = matches!(what, Taken::Report | Taken::Table(_));
     let why_not = if saving.path.trim().is_empty() {
         Some(tr!("It needs a name."))
     } else if needs && result.is_none() {
@@ -184,7 +188,10 @@ pub(crate) fn sheet(
             match (what, result) {
                 (Taken::Picture(panel), _) => actions.ask(Action::TakePicture(path, panel)),
                 (Taken::Table(name), Some(result)) => {
-                    saving.task = Some(table(name, path, result, &mut jobs));
+                    saving.task = Some(table(path, move || named(&result, name), &mut jobs));
+                }
+                (Taken::Values(_, csv), _) => {
+                    saving.task = Some(table(path, move || csv, &mut jobs));
                 }
                 (Taken::Report, Some(result)) => {
                     let with_pdf = saving.with_pdf && pdf::printer().is_some();
@@ -209,15 +216,18 @@ pub(crate) fn sheet(
     });
 }
 
+/// The table of this name of a prediction.
+fn named(result: &Prediction, name: &str) -> String {
+    tables(result).into_iter().find(|t| t.0 == name).map(|t| t.1).unwrap_or_default()
+}
+
 fn table(
-    name: &'static str,
     path: PathBuf,
-    result: Arc<Prediction>,
+    make: impl FnOnce() -> String + Send + 'static,
     jobs: &mut Jobs,
 ) -> Task<Result<Written, String>> {
     Task::spawn(jobs, tr!("writing {}", path.display()), move |_| {
-        let all = tables(&result);
-        let text = all.iter().find(|t| t.0 == name).map_or("", |t| t.1.as_str());
+        let text = make();
         let written = file::put(&path, |out| out.write_all(text.as_bytes()));
         written.map_err(|e| format!("{}: {e}", path.display()))?;
         Ok(Written { files: None, path })

@@ -253,3 +253,120 @@ fn evidence_is_placed_by_dragging_along_its_member() {
     let high = along(&window);
     assert!((0.0..1.0).contains(&low) && high > low + 0.1, "{low} {high}");
 }
+
+/// Drags from one place to another with the left button.
+fn draw(window: &mut Window, from: egui::Pos2, to: egui::Pos2) {
+    window.harness.hover_at(from);
+    window.frame();
+    window.harness.drag_at(from);
+    window.frames(2);
+    for k in 1..=8 {
+        window.harness.hover_at(from.lerp(to, k as f32 / 8.0));
+        window.frame();
+    }
+    window.harness.drop_at(to);
+    window.frames(3);
+}
+
+/// All that the window says with this text in it.
+fn said(window: &Window, text: &str) -> Vec<String> {
+    let nodes = window.harness.query_all_by_label_contains(text).map(|n| n.accesskit_node());
+    nodes.filter_map(|n| n.label().or_else(|| n.value())).collect()
+}
+
+/// The one number that stands before this unit.
+fn number(window: &Window, unit: &str) -> f64 {
+    let said = said(window, unit);
+    let numbers: Vec<f64> =
+        said.iter().filter_map(|s| s.strip_suffix(unit)?.parse().ok()).collect();
+    assert_eq!(numbers.len(), 1, "{said:?}");
+    numbers[0]
+}
+
+/// What a click on a button puts on the clipboard.
+fn copied(window: &mut Window, button: &str) -> String {
+    window.harness.get_by_label(button).click();
+    window.frame();
+    let commands = &window.harness.output().platform_output.commands;
+    let text = commands.iter().find_map(|command| match command {
+        egui::OutputCommand::CopyText(text) => Some(text.clone()),
+        _ => None,
+    });
+    text.expect("something is copied")
+}
+
+/// The column's third member, whose first slice is seen; where a place is drawn, mm from the
+/// middle.
+fn with_slice() -> (Window, impl Fn(f32, f32) -> egui::Pos2) {
+    let mut window = with_column();
+    window.ask(Action::Select(Some(2)));
+    window.frames(2);
+    window.ask(Action::Slice(0));
+    window.until_seen("CT slice");
+    window.frames(2);
+    let rect = window.harness.get_by_label("CT slice").rect();
+    // All of the slice, 512 pixels of 0.9 mm, fits into the picture.
+    let points_per_mm = rect.width().min(rect.height()) / (512.0 * 0.9);
+    (window, move |x, y| rect.center() + points_per_mm * egui::vec2(x, y))
+}
+
+/// A line over a slice is a plot with its length and a table; both follow the slice that is shown.
+/// Escape puts the tool away, and leaves the member selected.
+#[test]
+fn a_line_over_a_slice_is_a_plot_with_its_length() {
+    let (mut window, at) = with_slice();
+    window.click("Line");
+    assert!(!has(&window, "Grey along the line"));
+    draw(&mut window, at(-60.0, -40.0), at(60.0, 50.0));
+    assert!(has(&window, "Grey along the line"));
+    let long = number(&window, " mm long");
+    assert!((long - 150.0).abs() < 0.5, "{long} mm");
+    // Samples at every half of a pixel.
+    let first = said(&window, " values, ");
+    let count: usize = first[0].split(' ').next().and_then(|n| n.parse().ok()).expect("a count");
+    assert!(count.abs_diff(335) <= 2, "{first:?}");
+    let table = copied(&mut window, "Copy as table");
+    let rows: Vec<Vec<&str>> = table.lines().map(|row| row.split('\t').collect()).collect();
+    assert_eq!((rows.len(), &rows[0][..]), (count + 1, &["along_mm", "x_mm", "y_mm", "grey"][..]));
+    let end: f64 = rows[count][0].parse().expect("a distance");
+    assert!((end - long).abs() < 0.01, "{end} {long}");
+    window.ask(Action::Slice(1));
+    while said(&window, " values, ") == first {
+        window.frame();
+        rest();
+    }
+    assert_eq!(number(&window, " mm long"), long);
+    assert_eq!(said(&window, " values, ").len(), 1);
+    window.harness.key_press(egui::Key::Escape);
+    window.frames(2);
+    assert!(!has(&window, "Grey along the line"));
+    assert_eq!(window.with(|w| *w.resource::<Selection>()), Selection(Some(2)));
+}
+
+/// A region tells its area and what is in it, and its table is saved.
+#[test]
+fn a_region_of_a_slice_tells_its_area() {
+    let (mut window, at) = with_slice();
+    let folder = tempfile::tempdir().expect("a folder");
+    window.click("Rectangle");
+    draw(&mut window, at(-45.0, -36.0), at(45.0, 36.0));
+    let rectangle = number(&window, " mm²");
+    assert!((rectangle / (90.0 * 72.0) - 1.0).abs() < 0.02, "{rectangle} mm²");
+    window.click("Ellipse");
+    assert!(!has(&window, " mm²"), "of another tool nothing is left");
+    draw(&mut window, at(-45.0, -36.0), at(45.0, 36.0));
+    let ellipse = number(&window, " mm²");
+    let share = std::f64::consts::FRAC_PI_4;
+    assert!((ellipse / rectangle - share).abs() < 0.02, "{ellipse} of {rectangle} mm²");
+    assert!(has(&window, "mean ± standard deviation"));
+    let table = copied(&mut window, "Copy as table");
+    let file = folder.path().join("region.csv");
+    window.click("Save as CSV…");
+    window.frames(2);
+    type_into(&mut window, "File to write", &file.display().to_string());
+    window.harness.get_by_role_and_label(egui::accesskit::Role::Button, "Save").click();
+    window.until("the table", |_| file.exists());
+    let saved = fs::read_to_string(&file).expect("a table");
+    assert!(saved.contains("\nellipse,"), "{saved}");
+    assert_eq!(saved.replace(',', "\t"), table);
+}

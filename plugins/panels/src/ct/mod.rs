@@ -4,6 +4,7 @@
 mod draw;
 mod picture;
 mod plots;
+mod probe;
 mod scan;
 mod source;
 
@@ -18,10 +19,11 @@ use intrados_scene::{Member, Scene, plugin::CurrentScene};
 use intrados_stage::{Estimate, Jobs, Task};
 use intrados_xray::plugin::{Scan, Scans};
 use plots::Order;
+use probe::{Drawn, Found, Probe};
 use source::{Read, Source};
 
 use crate::{
-    Actions, Selection,
+    Action, Actions, Selection,
     lang::{drag, term},
     members,
     zoom::Zoom,
@@ -55,6 +57,7 @@ pub(crate) struct Ct {
     /// Grey that is black and grey that is white; none: what suits the slice.
     window: Option<[f32; 2]>,
     view: Zoom,
+    probe: Probe,
     sinogram: bool,
     shelf: SliceShelf,
     wish: scan::Wish,
@@ -74,6 +77,7 @@ struct Shown {
     read: Read,
     grey: ([f32; 2], TextureHandle),
     labels: (Overlay, TextureHandle),
+    probed: Option<(Drawn, Found)>,
 }
 
 /// The porosities of a stack as far as they are known.
@@ -94,6 +98,11 @@ impl Ct {
     /// Shows a slice of those that the scene tells of.
     pub(crate) fn show(&mut self, index: usize) {
         (self.origin, self.index, self.sinogram) = (Some(Origin::Told), index, false);
+    }
+
+    /// Puts the tool away with what it has drawn; false if there was none.
+    pub(crate) fn end_tool(&mut self) -> bool {
+        std::mem::take(&mut self.probe).is_on()
     }
 
     fn method(&self) -> Method {
@@ -171,7 +180,10 @@ pub(crate) fn ct(
     let right = Rect::from_min_max(pos2(left.right() + 8.0, area.top()), area.max);
     picture::show(ui, ct, left, unit);
     ui.scope_builder(egui::UiBuilder::new().max_rect(right), |ui| {
-        aside(ui, ct, scene, &sources, &mut jobs, right.height())
+        if let Some(action) = probed(ui, ct, unit) {
+            actions.ask(action);
+        }
+        aside(ui, ct, scene, &sources, &mut jobs);
     });
     ui.advance_cursor_after_rect(area);
 }
@@ -262,7 +274,7 @@ fn collect(ui: &Ui, ct: &mut Ct) {
                     ct.overlay,
                     load(draw::labels(&read, ct.overlay), "labels", TextureOptions::NEAREST),
                 );
-                Ok(Shown { read, grey, labels })
+                Ok(Shown { read, grey, labels, probed: None })
             }
             Ok(Err(reason)) => Err(reason),
             Err(_) => Err(tr!("the reader broke off")),
@@ -316,6 +328,8 @@ fn tools(ui: &mut Ui, ct: &mut Ct, sources: &[(String, Source)], has_sinogram: b
             }
         });
         ui.separator();
+        ct.probe.tools(ui);
+        ui.separator();
         windowing(ui, ct);
     });
 }
@@ -364,6 +378,15 @@ fn windowing(ui: &mut Ui, ct: &mut Ct) {
     }
 }
 
+/// What the slice has where something is drawn over it.
+fn probed(ui: &mut Ui, ct: &Ct, unit: &str) -> Option<Action> {
+    let (Some(Ok(shown)), Some(drawn)) = (&ct.shown, ct.probe.drawn()) else { return None };
+    // What was measured elsewhere is no longer told.
+    let found = shown.probed.as_ref().filter(|(of, _)| *of == drawn).map(|(_, found)| found);
+    let height = (0.2 * ui.available_height()).clamp(60.0, 130.0);
+    probe::results(ui, drawn, found, unit, height)
+}
+
 /// Histogram, porosity along the axis, table.
 fn aside(
     ui: &mut Ui,
@@ -371,7 +394,6 @@ fn aside(
     scene: &Arc<Scene>,
     sources: &[(String, Source)],
     jobs: &mut Jobs,
-    height: f32,
 ) {
     let method = ct.method();
     let Ct {
@@ -390,7 +412,7 @@ fn aside(
         return;
     };
     let window = window.unwrap_or_else(|| shown.read.suitable());
-    let each = (0.5 * (height - 260.0)).clamp(50.0, 130.0);
+    let each = (0.5 * (ui.available_height() - 260.0)).clamp(50.0, 130.0);
     plots::histogram(ui, &shown.read, window, each);
     if let Some(index) = plots::profile(ui, &profile.along, shown.read.truth, *now, each) {
         *now = index;

@@ -1,8 +1,8 @@
-//! The slice itself: zoom, pan, window by dragging, pores by clicking.
+//! The slice itself: zoom, pan, window and tools by dragging, pores by clicking.
 
 use egui::{Color32, PointerButton, Rect, Response, Sense, TextureOptions, Ui, Vec2, pos2, vec2};
 
-use super::{Ct, Shown, draw, source::Read};
+use super::{Ct, Probe, Shown, draw, source::Read};
 use crate::{
     colours,
     lang::{fixed, term},
@@ -27,7 +27,9 @@ pub(super) fn show(ui: &mut Ui, ct: &mut Ct, rect: Rect, unit: &str) {
     };
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, tr!("CT slice")));
     let size = vec2(shown.read.slice.grey.width as f32, shown.read.slice.grey.height as f32);
-    hand(ui, &response, &mut ct.view, &mut ct.window, &shown.read, rect, size);
+    hand(ui, &response, &mut ct.view, &mut ct.window, &mut ct.probe, &shown.read, rect, size);
+    let is_drawing = response.dragged_by(PointerButton::Primary);
+    ct.probe.refresh(&shown.read, is_drawing, &mut shown.probed);
     let window = ct.window.unwrap_or_else(|| shown.read.suitable());
     refresh(shown, window, ct.overlay);
     let place = ct.view.place(rect, size);
@@ -53,6 +55,7 @@ pub(super) fn show(ui: &mut Ui, ct: &mut Ct, rect: Rect, unit: &str) {
             painter.circle_stroke(at, radius, (width, colour));
         }
     }
+    ct.probe.draw(&painter, place, scale / shown.read.slice.pixel_mm);
     legend(ui, rect, window, unit);
     ruler(ui, rect, scale / shown.read.slice.pixel_mm);
     let caption = match response.hover_pos().map(pixel).and_then(|at| under(&shown.read, at, unit))
@@ -77,13 +80,14 @@ pub(super) fn show(ui: &mut Ui, ct: &mut Ct, rect: Rect, unit: &str) {
     });
 }
 
-/// Left button pans, right button changes window and level, the wheel zooms at the pointer, a
-/// double click shows all.
+/// Left button pans, or draws where a tool is on; middle button pans; right button changes window
+/// and level, the wheel zooms at the pointer, a double click shows all.
 fn hand(
     ui: &Ui,
     response: &Response,
     view: &mut Zoom,
     window: &mut Option<[f32; 2]>,
+    probe: &mut Probe,
     read: &Read,
     rect: Rect,
     size: Vec2,
@@ -95,6 +99,8 @@ fn hand(
         let width = ((high - low) * (0.005 * delta.x).exp()).max(0.01 * unit);
         let level = 0.5 * (low + high) - 0.002 * unit * delta.y;
         *window = Some([level - 0.5 * width, level + 0.5 * width]);
+    } else if probe.is_on() && response.dragged_by(PointerButton::Primary) {
+        probe.drag(ui, view.place(rect, size), size * read.slice.pixel_mm);
     } else if response.dragged() {
         view.pull(delta, rect, size);
     }
