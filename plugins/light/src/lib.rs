@@ -25,7 +25,7 @@ pub mod tone;
 pub mod verify;
 
 pub use exposure::{Exposure, Mismatch, PASS, Passes, Shard};
-pub use field::{Culprit, Effort, Guide, false_colours, learn};
+pub use field::{Culprit, Effort, Guide, false_colours, learn, spread};
 pub use film::{Film, ORDERS};
 pub use lit::LitScene;
 pub use measure::{CombinedReading, Measurement, MeterReading, SideReading, readings};

@@ -4,11 +4,12 @@
 use std::sync::LazyLock;
 
 use glam::Vec3;
+use serde::{Deserialize, Serialize};
 
 use crate::luminance;
 
-/// What a pixel that is not a number looks like: a magenta that neither curve nor map produces from
-/// numbers near it.
+/// What a pixel that is not a number looks like: a magenta that no curve produces from numbers near
+/// it.
 pub(crate) const NOT_A_NUMBER: [u8; 3] = [255, 0, 255];
 
 /// How display luminance follows scene luminance.
@@ -112,49 +113,110 @@ pub(crate) fn srgb(linear: f32) -> u8 {
     }
 }
 
-/// Perceptually uniform colour maps.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+/// Sequential colour maps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum ColourMap {
-    /// Smith & van der Walt 2015.
+    /// Smith & van der Walt 2015: perceptually uniform.
     #[default]
     Viridis,
     /// Nuñez, Anderton & Renslow 2018: the same for people with colour-vision deficiency.
     Cividis,
+    /// Mikhailov 2019: more hues, to tell near values apart. It is darkest at both ends, so that it
+    /// says nothing in print.
+    Turbo,
+    /// Black to white in even steps of sRGB.
+    Grey,
 }
 
 impl ColourMap {
-    /// sRGB bytes at `t`, clamped to [0, 1]; NaN is `NOT_A_NUMBER`.
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Viridis, Self::Cividis, Self::Turbo, Self::Grey];
+
+    /// sRGB bytes at `t`, clamped to [0, 1]; NaN is [`Self::unknown`].
     #[must_use]
     pub fn at(self, t: f32) -> [u8; 3] {
         if t.is_nan() {
-            return NOT_A_NUMBER;
+            return self.unknown();
         }
+        let t = t.clamp(0.0, 1.0);
         let map = match self {
             Self::Viridis => colorous::VIRIDIS,
             Self::Cividis => colorous::CIVIDIS,
+            Self::Turbo => colorous::TURBO,
+            Self::Grey => return [(255.0 * t).round() as u8; 3],
         };
-        map.eval_continuous(f64::from(t.clamp(0.0, 1.0))).into_array()
+        map.eval_continuous(f64::from(t)).into_array()
+    }
+
+    /// Where there is no number: a grey that the map itself comes near to nowhere, else green.
+    #[must_use]
+    pub fn unknown(self) -> [u8; 3] {
+        match self {
+            Self::Viridis | Self::Turbo => [96; 3],
+            // Its middle is a dark grey.
+            Self::Cividis => [216; 3],
+            Self::Grey => [0, 158, 115],
+        }
     }
 }
+
+/// What lies below a range that is clipped: a blue that is far from every map (ΔE*ab above 55).
+pub const BELOW: [u8; 3] = [0, 0, 255];
+/// What lies above it: a pink, as far.
+pub const ABOVE: [u8; 3] = [255, 0, 170];
 
 /// A field shown in colours.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FalseColour {
     /// Which colours.
     pub map: ColourMap,
-    /// Values at the first and the last colour, in the field's unit; what lies beyond takes the
-    /// nearest.
+    /// Values at the first and the last colour, in the field's unit.
     pub range: [f32; 2],
+    /// Whether equal ratios are equally far apart instead of equal differences; both ends of the
+    /// range are above 0 then.
+    pub is_logarithmic: bool,
+    /// So many colours in all; below 2: as many as the map has.
+    pub bands: u8,
+    /// Whether what lies beyond the range is [`BELOW`] or [`ABOVE`] it; else it takes the nearest
+    /// colour.
+    pub is_clipped: bool,
 }
 
 impl FalseColour {
-    /// sRGB bytes of a value; NaN is `NOT_A_NUMBER`. In an empty range everything is in the middle.
+    /// sRGB bytes of a value; NaN is [`ColourMap::unknown`].
     #[must_use]
     pub fn encode(&self, value: f32) -> [u8; 3] {
+        self.place(value).map_or_else(|colour| colour, |t| self.map.at(t))
+    }
+
+    /// Where on the map a value is, from 0 to 1; or the colour that it has instead, where it is no
+    /// number or clipped. In an empty range everything is in the middle.
+    ///
+    /// # Errors
+    ///
+    /// That colour.
+    pub fn place(&self, value: f32) -> Result<f32, [u8; 3]> {
         let [lo, hi] = self.range;
-        let t = if value.is_nan() || lo != hi { (value - lo) / (hi - lo) } else { 0.5 };
+        if value.is_nan() {
+            return Err(self.map.unknown());
+        }
+        if self.is_clipped && (value < lo || value > hi) {
+            return Err(if value < lo { BELOW } else { ABOVE });
+        }
+        let share = match self.is_logarithmic {
+            true => (value.max(f32::MIN_POSITIVE) / lo).ln() / (hi / lo).ln().max(1e-3),
+            false => (value - lo) / (hi - lo),
+        };
         // ∞ − ∞ and the like: a number that does not fit the range is still a number.
-        self.map.at(if t.is_nan() && !value.is_nan() { 0.5 } else { t })
+        let t = if share.is_nan() || lo == hi { 0.5 } else { share.clamp(0.0, 1.0) };
+        Ok(self.band(t))
+    }
+
+    /// The colours of the first and the last band are those of the map's ends.
+    fn band(&self, t: f32) -> f32 {
+        let count = f32::from(self.bands);
+        if self.bands < 2 { t } else { (t * count).floor().min(count - 1.0) / (count - 1.0) }
     }
 }
 
@@ -222,8 +284,8 @@ mod tests {
             assert_eq!(tone.encode(Vec3::splat(f32::INFINITY)), [255; 3]);
             assert_eq!(tone.encode(Vec3::splat(-1.0)), [0; 3]);
         }
-        let shown = FalseColour { map: ColourMap::Cividis, range: [-1.0, 3.0] };
-        assert_eq!(shown.encode(f32::NAN), NOT_A_NUMBER);
+        let shown = FalseColour { range: [-1.0, 3.0], ..of(ColourMap::Cividis) };
+        assert_eq!(shown.encode(f32::NAN), [216; 3]);
         assert_eq!(
             [shown.encode(-9.0), shown.encode(f32::INFINITY)],
             [[0, 32, 81], [253, 233, 69]]
@@ -235,10 +297,61 @@ mod tests {
         );
     }
 
-    /// What makes the maps honest: lightness only rises.
+    /// A map over 0 to 1.
+    fn of(map: ColourMap) -> FalseColour {
+        FalseColour { map, range: [0.0, 1.0], is_logarithmic: false, bands: 0, is_clipped: false }
+    }
+
+    #[test]
+    fn bands_are_so_many_colours_from_end_to_end() {
+        for map in ColourMap::ALL {
+            for bands in [5_u8, 10] {
+                let shown = FalseColour { bands, ..of(map) };
+                let mut seen: Vec<[u8; 3]> =
+                    (0..=1000).map(|i| shown.encode(i as f32 / 1000.0)).collect();
+                assert_eq!((seen[0], seen[1000]), (map.at(0.0), map.at(1.0)), "{map:?}");
+                // Each in one piece, and none of them again.
+                seen.dedup();
+                assert_eq!(seen.len(), usize::from(bands), "{map:?}");
+                seen.sort_unstable();
+                seen.dedup();
+                assert_eq!(seen.len(), usize::from(bands), "{map:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_clipped_is_no_colour_of_a_map() {
+        for map in ColourMap::ALL {
+            let shown = FalseColour { range: [2.0, 4.0], is_clipped: true, ..of(map) };
+            assert_eq!([1.9, 4.1].map(|v| shown.encode(v)), [BELOW, ABOVE]);
+            assert_eq!([2.0, 4.0].map(|v| shown.encode(v)), [map.at(0.0), map.at(1.0)]);
+            let nearest = FalseColour { is_clipped: false, ..shown };
+            assert_eq!([1.9, 4.1].map(|v| nearest.encode(v)), [map.at(0.0), map.at(1.0)]);
+            let others = [BELOW, ABOVE, map.unknown()];
+            for colour in (0..=255).map(|i| map.at(i as f32 / 255.0)) {
+                for other in others {
+                    let far: i32 =
+                        (0..3).map(|k| (i32::from(colour[k]) - i32::from(other[k])).abs()).sum();
+                    assert!(far > 40, "{map:?}: {colour:?} and {other:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_logarithmic_scale_has_the_geometric_mean_in_the_middle() {
+        let shown =
+            FalseColour { range: [1e-3, 10.0], is_logarithmic: true, ..of(ColourMap::Grey) };
+        let middle = shown.place(0.1).unwrap();
+        assert!((middle - 0.5).abs() < 1e-5, "{middle}");
+        assert_eq!([0.0, 1e-3, 10.0].map(|v| shown.place(v).unwrap()), [0.0, 0.0, 1.0]);
+    }
+
+    /// What makes the maps honest: lightness only rises. Turbo's does not, and no view begins with it.
     #[test]
     fn maps_rise_in_lightness() {
-        for map in [ColourMap::Viridis, ColourMap::Cividis] {
+        for map in [ColourMap::Viridis, ColourMap::Cividis, ColourMap::Grey] {
             let y = |t: f32| {
                 let [r, g, b] = map.at(t).map(|c| (f32::from(c) / 255.0).powf(2.2));
                 luminance(Vec3::new(r, g, b))

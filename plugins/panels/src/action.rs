@@ -11,7 +11,7 @@ use intrados_scene::{
 };
 
 use crate::{
-    Banners, Language, Log, Look, Quantity, Refine, Selection, Viewpoint, Workspace,
+    Banners, Colours, Language, Log, Look, Quantity, Refine, Selection, Viewpoint, Workspace,
     attach::Form,
     command::Palette,
     create::Creation,
@@ -81,6 +81,8 @@ pub enum Action {
     Theme(egui::ThemePreference),
     /// Speak a language.
     Speak(Language),
+    /// Show numbers in these colours.
+    Colours(Colours),
     /// Fill the screen, or no more.
     Fullscreen,
     /// Close the window.
@@ -242,6 +244,7 @@ fn carry_out(world: &mut World, action: Action) {
         Action::ResetLayout => world.resource_mut::<Desk>().reset(),
         Action::Theme(theme) => world.resource_mut::<Desk>().dress(theme),
         Action::Speak(language) => world.resource_mut::<Desk>().speak(language),
+        Action::Colours(colours) => world.resource_mut::<Look>().colours = colours,
         Action::Fullscreen => world.resource_mut::<Layout>().toggle_fullscreen(),
         Action::Quit => world.resource_mut::<Layout>().quits = true,
         Action::Slice(index) => {

@@ -13,6 +13,7 @@ use crate::{
     place::Panels,
     recent::Recent,
     saving::Taken,
+    scale,
     workspace::Desk,
 };
 
@@ -166,6 +167,9 @@ fn all(world: &World) -> Vec<Command> {
             Workspace::Expert => tr!("layout: Expert"),
         };
         all.push(command(name, "", None, Action::Arrange(workspace)));
+    }
+    for (name, colours) in scale::choices(world.resource::<Look>().colours).into_iter().flatten() {
+        all.push(command(tr!("colours: {}", name), "", None, Action::Colours(colours)));
     }
     for panel in &world.resource::<Panels>().0 {
         let action = Action::Panel(panel.name.clone(), true);

@@ -7,11 +7,12 @@ use egui::{Rect, Sense, TextureHandle, TextureOptions, Ui, Vec2, vec2};
 use intrados_light::{
     Guide,
     plugin::{Learning, Lit},
+    spread,
 };
 use intrados_transport::Side;
 
 use crate::{
-    colours,
+    Colours, Look, colours,
     fields::{self, Fields},
     number::significant,
 };
@@ -22,8 +23,8 @@ const N: u32 = 32;
 /// The squares that are shown.
 #[derive(Resource, Default)]
 pub(crate) struct Directions {
-    /// Which guide, and which point of the picture.
-    of: Option<(Arc<Guide>, Vec2)>,
+    /// Which guide, which point of the picture, and in which colours.
+    of: Option<(Arc<Guide>, Vec2, Colours)>,
     /// Of each field, and the values of its first and last colour.
     squares: [Option<(TextureHandle, [f32; 2])>; 2],
 }
@@ -33,6 +34,7 @@ pub(crate) fn directions(
     learning: Res<Learning>,
     lit: Option<Res<Lit>>,
     fields: Res<Fields>,
+    look: Res<Look>,
     mut shown: ResMut<Directions>,
 ) {
     let (Some(guide), Some(camera), Some(lit)) = (learning.guide(), learning.camera(), lit) else {
@@ -40,16 +42,20 @@ pub(crate) fn directions(
         return;
     };
     let at = fields.picked();
-    if shown.of.as_ref().is_none_or(|(of, point)| !Arc::ptr_eq(of, guide) || *point != at) {
+    let is_shown = shown.of.as_ref().is_some_and(|(of, point, colours)| {
+        Arc::ptr_eq(of, guide) && *point == at && *colours == look.colours
+    });
+    if !is_shown {
         let camera = fields::camera(camera);
         let [x, y] =
             fields::pixel([camera.width as usize, camera.height as usize], at).map(|i| i as u32);
         shown.squares = Side::BOTH.map(|side| {
             let values = guide.directions(&lit.0, &camera, [x, y], side, N)?;
-            let (image, range) = fields::image(&values, N as usize);
+            let range = spread(&values);
+            let image = fields::image(&values, N as usize, &look.colours.over(range, true));
             Some((ui.ctx().load_texture("directions", image, TextureOptions::NEAREST), range))
         });
-        shown.of = Some((Arc::clone(guide), at));
+        shown.of = Some((Arc::clone(guide), at, look.colours));
     }
     ui.columns(2, |columns| {
         for (side, ui) in Side::BOTH.into_iter().zip(columns) {

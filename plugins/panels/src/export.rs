@@ -141,7 +141,7 @@ fn save(
             let done = format!(
                 "{}: {}",
                 path.display(),
-                describe(render, look, painted.map(|painted| painted.range))
+                describe(render, look, painted.map(|painted| painted.scale.range))
             );
             Task::spawn(jobs, label, move |_| {
                 write_png(&pixels, &path).map(|()| done).map_err(|e| e.to_string())
@@ -157,10 +157,11 @@ fn describe(render: &Render, look: &Look, range: Option<[f32; 2]>) -> String {
     {
         let [what, unit] = fields::meaning(side);
         return tr!(
-            "{}: {}, {}, viridis, logarithmic from {} to {} {}; scene hash {}; Intrados {}",
+            "{}: {}, {}, {}, logarithmic from {} to {} {}; scene hash {}; Intrados {}",
             scene.name,
             term(&fields::name(side).to_lowercase()),
             term(what),
+            look.colours.said(),
             from,
             to,
             unit,
@@ -175,7 +176,8 @@ fn describe(render: &Render, look: &Look, range: Option<[f32; 2]>) -> String {
         Quantity::Error => {
             let [from, to] = picture::ERRORS.map(|x| local(x.to_string()));
             tr!(
-                "relative standard error of each pixel, viridis, logarithmic from {} to {}",
+                "relative standard error of each pixel, {}, logarithmic from {} to {}",
+                look.colours.said(),
                 from,
                 to
             )

@@ -3,17 +3,23 @@
 use std::sync::Arc;
 
 use bevy_ecs::prelude::*;
-use egui::{Color32, ColorImage, TextureHandle, TextureOptions, Vec2, vec2};
+use egui::{ColorImage, TextureHandle, TextureOptions, Vec2, vec2};
 use glam::Vec3;
 use intrados_light::{
-    Guide, LitScene, false_colours,
+    Guide, LitScene,
     plugin::{Learning, Lit},
+    spread,
+    tone::FalseColour,
 };
 use intrados_scene::Camera;
 use intrados_stage::{Jobs, Task, aside};
 use intrados_transport::Side;
+use rayon::prelude::*;
 
-use crate::{Look, Quantity, orbit};
+use crate::{
+    Colours, Look, Quantity, orbit,
+    scale::{self, Ranges},
+};
 
 /// Pixels of a picture of a field, however small the camera's own are.
 const PIXELS: u32 = 200_000;
@@ -34,9 +40,11 @@ pub(crate) struct Fields {
 /// A picture of one field.
 pub(crate) struct Painted {
     values: Vec<f32>,
+    /// Over what they are spread.
+    spread: [f32; 2],
     pub(crate) image: ColorImage,
-    /// Values of the first and the last colour.
-    pub(crate) range: [f32; 2],
+    /// How they became colours.
+    pub(crate) scale: FalseColour,
 }
 
 impl Fields {
@@ -47,6 +55,18 @@ impl Fields {
     /// The picture of the field of a side, once it is there.
     pub(crate) fn painted(&self, side: Side) -> Option<&Painted> {
         self.shown.as_ref().map(|both| &both[side as usize])
+    }
+
+    /// Puts on the colours and the range that are wanted now.
+    fn colour(&mut self, side: Side, look: &Look, ranges: &Ranges) {
+        let Some(both) = &mut self.shown else { return };
+        let painted = &mut both[side as usize];
+        let wanted = look.colours.locked_or_over(painted.spread, true, name(side), ranges);
+        if painted.scale != wanted {
+            painted.image = image(&painted.values, painted.image.size[0], &wanted);
+            painted.scale = wanted;
+            self.textures[side as usize] = None;
+        }
     }
 
     /// What the field says at a share of the picture's width and height.
@@ -104,6 +124,7 @@ pub(crate) fn paint(
     learning: Res<Learning>,
     lit: Option<Res<Lit>>,
     look: Res<Look>,
+    ranges: Res<Ranges>,
     mut fields: ResMut<Fields>,
     mut jobs: ResMut<Jobs>,
 ) {
@@ -119,6 +140,9 @@ pub(crate) fn paint(
     if let Some(done) = Task::take(&mut fields.task) {
         fields.shown = done.ok();
     }
+    if let Quantity::Field(side) = look.quantity {
+        fields.colour(side, &look, &ranges);
+    }
     let is_wanted = matches!(look.quantity, Quantity::Field(_))
         && fields.task.is_none()
         && fields.shown.is_none();
@@ -127,22 +151,30 @@ pub(crate) fn paint(
     else {
         return;
     };
-    let (lit, camera) = (Arc::clone(&lit.0), camera(of));
+    let (lit, camera, colours) = (Arc::clone(&lit.0), camera(of), look.colours);
     // Not in the list of jobs: it takes less than a second.
-    let work = move |_: &_| aside(|| Side::BOTH.map(|side| painted(&guide, &lit, &camera, side)));
+    let work =
+        move |_: &_| aside(|| Side::BOTH.map(|side| painted(&guide, &lit, &camera, side, colours)));
     fields.task =
         Some(Task::spawn_unlisted(jobs.bypass_change_detection(), "painting the fields", work));
 }
 
-fn painted(guide: &Guide, lit: &LitScene, camera: &Camera, side: Side) -> Painted {
+fn painted(
+    guide: &Guide,
+    lit: &LitScene,
+    camera: &Camera,
+    side: Side,
+    colours: Colours,
+) -> Painted {
     let values = guide.picture(lit, camera, side);
-    let (image, range) = image(&values, camera.width as usize);
-    Painted { values, image, range }
+    let spread = spread(&values);
+    let scale = colours.over(spread, true);
+    let image = image(&values, camera.width as usize, &scale);
+    Painted { values, spread, image, scale }
 }
 
-/// Values as an image of so many columns, and the values of its first and last colour.
-pub(crate) fn image(values: &[f32], width: usize) -> (ColorImage, [f32; 2]) {
-    let (colours, range) = false_colours(values);
-    let pixels = colours.iter().map(|&[r, g, b]| Color32::from_rgb(r, g, b)).collect();
-    (ColorImage::new([width, values.len() / width.max(1)], pixels), range)
+/// Values as an image of so many columns.
+pub(crate) fn image(values: &[f32], width: usize, scale: &FalseColour) -> ColorImage {
+    let pixels = values.par_iter().map(|&v| scale::ink(scale.encode(v))).collect();
+    ColorImage::new([width, values.len() / width.max(1)], pixels)
 }

@@ -38,6 +38,7 @@ use crate::{
     recent::Recent,
     report::Report,
     saving::{self, Saving},
+    scale::{self, Ranges},
     session, start,
     stress::Stress,
     toast,
@@ -236,6 +237,8 @@ fn run(world: &mut World, system: SystemId<InMut<'static, Ui>>, name: &str, ui: 
 fn panels(ui: &mut Ui, world: &mut World) {
     Side::top("menu").show(ui, |ui| menu(ui, world));
     Side::bottom("status").exact_size(24.0).show(ui, |ui| status(ui, world));
+    let (colours, ranges) = (world.resource::<Look>().colours, world.resource::<Ranges>().clone());
+    world.resource_mut::<Desk>().keep(colours, &ranges);
     CentralPanel::default().frame(egui::Frame::NONE).show(ui, |ui| {
         workspace::show(ui, world, &mut |panel, ui, world| {
             run(world, panel.system, &panel.name, ui);
@@ -374,7 +377,7 @@ fn edits(world: &World, is_open: bool) -> [(String, &'static str, bool, Action);
     ]
 }
 
-/// Layouts, panels, themes and languages.
+/// Layouts, panels, themes, colours and languages.
 fn arrangement(ui: &mut Ui, world: &World, asked: &mut Vec<Action>) {
     let desk = world.resource::<Desk>();
     for workspace in Workspace::BOTH {
@@ -406,6 +409,19 @@ fn arrangement(ui: &mut Ui, world: &World, asked: &mut Vec<Action>) {
             asked.push(Action::Theme(theme));
         }
     }
+    let now = world.resource::<Look>().colours;
+    ui.menu_button(tr!("Colours"), |ui| {
+        for (group, choices) in scale::choices(now).into_iter().enumerate() {
+            if group > 0 {
+                ui.separator();
+            }
+            for (name, colours) in choices {
+                if ui.radio(colours == now, name).clicked() {
+                    asked.push(Action::Colours(colours));
+                }
+            }
+        }
+    });
     ui.menu_button(tr!("Language"), |ui| {
         for language in Language::ALL {
             let can = language != Language::Chinese || writes(ui, language.name());

@@ -7,12 +7,12 @@ use egui::{Color32, ColorImage, TextureHandle, TextureOptions, Vec2};
 use glam::Vec3;
 use intrados_light::{
     Film, ORDERS, Render, View, luminance,
-    tone::{ColourMap, Tone},
+    tone::{FalseColour, Tone},
 };
 use intrados_transport::Side;
 use rayon::prelude::*;
 
-use crate::{Statistics, Viewpoint, colours};
+use crate::{Colours, Statistics, Viewpoint, scale};
 
 /// A large film is developed in so many bands of rows, one a frame: all of it at once would take
 /// half a frame.
@@ -47,6 +47,8 @@ pub struct Look {
     pub exposure: f32,
     /// Whether the selected member is outlined.
     pub outline: bool,
+    /// Of errors and fields, and of numbers in the rest of the window.
+    pub colours: Colours,
 }
 
 impl Default for Look {
@@ -57,6 +59,7 @@ impl Default for Look {
             quantity: Quantity::Radiance,
             exposure: 0.0,
             outline: true,
+            colours: Colours::default(),
         }
     }
 }
@@ -270,12 +273,13 @@ pub(crate) fn pixels(
     let (w, h) = (render.camera().width as usize, render.camera().height as usize);
     let parts = parts(render, look.view, share);
     let tone = Tone { exposure: look.exposure, ..Tone::default() };
+    let errors = error_scale(look);
     let mut pixels = vec![Color32::BLACK; w * rows.len()];
     pixels.par_chunks_mut(w).zip(rows.clone()).for_each(|(row, y)| {
         for (x, pixel) in row.iter_mut().enumerate() {
             let i = y * w + x;
             *pixel = match look.quantity {
-                Quantity::Error => error_colour(blend(&parts, None, i)),
+                Quantity::Error => error_colour(&errors, blend(&parts, None, i)),
                 // A field is no film: it has a picture of its own, and this one waits under it.
                 Quantity::Radiance | Quantity::Field(_) => {
                     let mut sum = Some(Vec3::ZERO);
@@ -298,25 +302,20 @@ pub(crate) fn pixels(
     ColorImage::new([w, rows.len()], pixels)
 }
 
-fn error_colour(value: Option<(Vec3, Vec3)>) -> Color32 {
-    let Some((mean, variance)) = value else { return colours::UNKNOWN };
-    let relative = relative_error(mean, variance);
-    if !relative.is_finite() {
-        return colours::UNKNOWN;
-    }
-    let [r, g, b] = ColourMap::Viridis.at(error_share(relative));
-    Color32::from_rgb(r, g, b)
+/// The scale of relative errors.
+pub(crate) fn error_scale(look: &Look) -> FalseColour {
+    look.colours.over(ERRORS, true)
+}
+
+fn error_colour(scale: &FalseColour, value: Option<(Vec3, Vec3)>) -> Color32 {
+    let relative = value.map(|(mean, variance)| relative_error(mean, variance));
+    scale::ink(scale.encode(relative.filter(|r| r.is_finite()).unwrap_or(f32::NAN)))
 }
 
 /// Standard error of the luminance over the luminance, the channels' errors taken as fully
 /// correlated (as the film's own error does).
 pub(crate) fn relative_error(mean: Vec3, variance: Vec3) -> f32 {
     luminance(variance.map(f32::sqrt)) / luminance(mean)
-}
-
-/// Place of a relative error on the colour map.
-fn error_share(relative: f32) -> f32 {
-    (relative / ERRORS[0]).log10() / (ERRORS[1] / ERRORS[0]).log10()
 }
 
 fn small(render: &Render, look: &Look, share: f64) -> Small {
@@ -343,6 +342,7 @@ pub(crate) struct Under {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use intrados_light::tone::ColourMap;
 
     #[test]
     fn an_underlay_keeps_its_corners_and_is_linear_between() {
@@ -360,9 +360,15 @@ mod tests {
     }
 
     #[test]
-    fn the_colour_map_is_logarithmic() {
-        assert!((error_share(ERRORS[0])).abs() < 1e-6);
-        assert!((error_share((ERRORS[0] * ERRORS[1]).sqrt()) - 0.5).abs() < 1e-6);
-        assert_eq!(error_colour(Some((Vec3::ONE, Vec3::INFINITY))), colours::UNKNOWN);
+    fn errors_are_in_the_colours_of_the_window_and_grey_where_they_are_unknown() {
+        let map = ColourMap::Turbo;
+        let look = Look { colours: Colours { map, bands: 0 }, ..Look::default() };
+        let of = |error: f32| {
+            error_colour(&error_scale(&look), Some((Vec3::ONE, Vec3::splat(error * error))))
+        };
+        assert_eq!(of(1e-5), scale::ink(map.at(0.0)));
+        assert_eq!(of(2.0), scale::ink(map.at(1.0)));
+        assert_eq!(of(f32::INFINITY), crate::colours::UNKNOWN);
+        assert_eq!(error_colour(&error_scale(&look), None), crate::colours::UNKNOWN);
     }
 }

@@ -48,11 +48,14 @@ impl PanelsPlugin {
 
 impl Plugin for PanelsPlugin {
     fn build(&self, app: &mut App) {
+        let desk = workspace::Desk::read(self.layout.clone());
+        let (colours, ranges) = desk.scales();
         app.init_resource::<Panels>()
             .init_resource::<Actions>()
             .init_resource::<Selection>()
             .insert_resource(workspace::SystemLanguage(self.language))
-            .init_resource::<Look>()
+            .insert_resource(Look { colours, ..Look::default() })
+            .insert_resource(ranges)
             .init_resource::<Viewpoint>()
             .init_resource::<Statistics>()
             .init_resource::<Latest>()
@@ -83,7 +86,7 @@ impl Plugin for PanelsPlugin {
             .init_resource::<toast::Toasts>()
             .init_resource::<saving::Saving>()
             .init_resource::<structure::Structure>()
-            .insert_resource(workspace::Desk::read(self.layout.clone()))
+            .insert_resource(desk)
             .insert_resource(intrados_light::plugin::Widening(stress::WIDENING))
             .insert_resource(Refine::new(self.slice))
             .insert_resource(session::Session::read(self.session.clone()))

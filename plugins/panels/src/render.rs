@@ -6,7 +6,6 @@ use glam::Vec3;
 use intrados_light::{
     ORDERS, Render, Trust, View,
     plugin::{Learning, Lit},
-    tone::ColourMap,
 };
 use intrados_scene::{Camera, Ray};
 use intrados_transport::Side;
@@ -18,7 +17,8 @@ use crate::{
     number::{count, duration, percent, plus_minus, significant},
     orbit,
     outline::Outline,
-    picture::{Cursor, ERRORS, Picture, Under},
+    picture::{self, Cursor, Picture, Under},
+    scale::{self, Ranges},
     steering,
 };
 
@@ -37,11 +37,12 @@ pub(crate) fn render(
     mut learning: ResMut<Learning>,
     mut fields: ResMut<Fields>,
     mut cursor: ResMut<Cursor>,
+    mut ranges: ResMut<Ranges>,
     selection: Res<Selection>,
     statistics: Res<Statistics>,
     mut actions: ResMut<Actions>,
 ) {
-    toolbar(ui, &mut look, &mut refine, &mut learning, &mut actions);
+    toolbar(ui, &mut look, &mut refine, &mut learning, &fields, &mut ranges, &mut actions);
     status(ui, &look, refine.bypass_change_detection(), &viewpoint, &statistics, render.as_deref());
     let (Some(render), Some(lit)) = (render, lit) else {
         cursor.set_if_neq(Cursor(None));
@@ -95,21 +96,16 @@ pub(crate) fn render(
     match look.quantity {
         Quantity::Radiance => {}
         Quantity::Error => {
-            let caption = tr!("relative standard error of a pixel (logarithmic; grey: unknown)");
+            let caption = tr!("relative standard error of a pixel (logarithmic)");
             let share = |error: f32| local(format!("{} %", 100.0 * error));
-            colour_scale(ui, below, ERRORS, share, &caption);
+            scale::legend(ui, below, &picture::error_scale(&look), share, &caption);
         }
         Quantity::Field(side) => {
             if let Some(painted) = fields.painted(side) {
                 let [what, unit] = fields::meaning(side);
-                let caption = tr!("{}, {} (logarithmic; grey: unknown)", term(what), unit);
-                colour_scale(
-                    ui,
-                    below,
-                    painted.range,
-                    |value| significant(f64::from(value), 2),
-                    &caption,
-                );
+                let caption = tr!("{}, {} (logarithmic)", term(what), unit);
+                let number = |value: f32| significant(f64::from(value), 2);
+                scale::legend(ui, below, &painted.scale, number, &caption);
             }
         }
     }
@@ -189,6 +185,8 @@ fn toolbar(
     look: &mut ResMut<Look>,
     refine: &mut ResMut<Refine>,
     learning: &mut ResMut<Learning>,
+    fields: &Fields,
+    ranges: &mut Ranges,
     actions: &mut Actions,
 ) {
     let mut new = **look;
@@ -236,6 +234,12 @@ fn toolbar(
         steering::choice(ui, learning);
         ui.separator();
         field_choice(ui, &mut new);
+        if let Quantity::Field(side) = new.quantity
+            && let Some(painted) = fields.painted(side)
+        {
+            let (seen, unit) = (painted.scale.range, fields::meaning(side)[1]);
+            scale::lock(ui, ranges, fields::name(side), seen, unit, true);
+        }
         ui.weak(steering::state(learning));
     });
     look.set_if_neq(new);
@@ -353,52 +357,4 @@ fn convergence(ui: &mut Ui, trust: &Trust) {
         ui.label(tr!("⚠ Not converged"))
             .on_hover_text(tr!("The error bar may be too small: {}", term(&trust.words())));
     }
-}
-
-/// Legend of a logarithmic colour map: its range, round numbers between, and what it shows.
-fn colour_scale(
-    ui: &Ui,
-    rect: Rect,
-    [lo, hi]: [f32; 2],
-    number: impl Fn(f32) -> String,
-    caption: &str,
-) {
-    let painter = ui.painter();
-    let bar = Rect::from_min_size(rect.min, vec2(rect.width(), 10.0));
-    let steps = 96;
-    for k in 0..steps {
-        let [r, g, b] = ColourMap::Viridis.at((k as f32 + 0.5) / steps as f32);
-        let x = |k: i32| bar.left() + bar.width() * k as f32 / steps as f32;
-        painter.rect_filled(
-            Rect::from_min_max(pos2(x(k), bar.top()), pos2(x(k + 1) + 0.5, bar.bottom())),
-            0.0,
-            Color32::from_rgb(r, g, b),
-        );
-    }
-    let font = egui::TextStyle::Small.resolve(ui.style());
-    let colour = ui.visuals().text_color();
-    let mark = |share: f32, align: egui::Align2, value: f32| {
-        painter.text(
-            pos2(bar.left() + bar.width() * share, bar.bottom() + 2.0),
-            align,
-            number(value),
-            font.clone(),
-            colour,
-        );
-    };
-    mark(0.0, egui::Align2::LEFT_TOP, lo);
-    mark(1.0, egui::Align2::RIGHT_TOP, hi);
-    let decades = (hi / lo).log10();
-    let steps: &[f32] = if decades < 2.0 { &[1.0, 2.0, 5.0] } else { &[1.0] };
-    for power in lo.log10().floor() as i32..=hi.log10().floor() as i32 {
-        for value in steps.iter().map(|step| step * 10_f32.powi(power)) {
-            let share = (value / lo).log10() / decades;
-            // Not on top of the ends.
-            if (0.12..=0.88).contains(&share) {
-                mark(share, egui::Align2::CENTER_TOP, value);
-            }
-        }
-    }
-    let middle = pos2(bar.left() + bar.width() * 0.5, bar.bottom() + 16.0);
-    painter.text(middle, egui::Align2::CENTER_TOP, caption, font, colour);
 }

@@ -16,9 +16,10 @@ use egui_tiles::{
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    Language, Place,
+    Colours, Language, Place,
     lang::{self, term},
     place::{Panel, Panels},
+    scale::Ranges,
 };
 
 /// Schema of the file.
@@ -87,6 +88,10 @@ struct Kept {
     /// None: as the system has it.
     #[serde(default)]
     language: Option<Language>,
+    #[serde(default)]
+    colours: Colours,
+    #[serde(default)]
+    ranges: Ranges,
     inspector: Option<KeptLayout>,
     expert: Option<KeptLayout>,
 }
@@ -236,6 +241,8 @@ pub(crate) struct Desk {
     theme: egui::ThemePreference,
     /// None: as the system has it.
     language: Option<Language>,
+    /// How numbers become colours.
+    scales: (Colours, Ranges),
     /// Whether the theme has been put on.
     is_dressed: bool,
     is_changed: bool,
@@ -250,12 +257,13 @@ impl Desk {
             .and_then(|f| std::fs::read_to_string(f).ok());
         let kept: Option<Kept> = text.and_then(|t| serde_json::from_str(&t).ok());
         let kept = kept.filter(|k| k.schema == SCHEMA);
-        let (chosen, theme, language, laid) = kept.map_or_else(Default::default, |k| {
+        let (chosen, theme, language, scales, laid) = kept.map_or_else(Default::default, |k| {
             let of = |kept: Option<KeptLayout>, workspace| Laid::of(kept?, workspace);
             let expert = of(k.expert, Workspace::Expert);
-            (k.chosen, k.theme.into(), k.language, [of(k.inspector, Workspace::Inspector), expert])
+            let laid = [of(k.inspector, Workspace::Inspector), expert];
+            (k.chosen, k.theme.into(), k.language, (k.colours, k.ranges), laid)
         });
-        Self { chosen, shown: chosen, theme, language, laid, file, ..Self::default() }
+        Self { chosen, shown: chosen, theme, language, scales, laid, file, ..Self::default() }
     }
 
     /// Not being able to write it is no reason to trouble anybody.
@@ -270,8 +278,8 @@ impl Desk {
         let [inspector, expert] = &self.laid;
         let [inspector, expert] = [inspector, expert].map(|l| l.as_ref().map(Laid::kept));
         let (schema, chosen, theme) = (SCHEMA.into(), self.chosen, self.theme.into());
-        let language = self.language;
-        let kept = Kept { schema, chosen, theme, language, inspector, expert };
+        let (language, (colours, ranges)) = (self.language, self.scales.clone());
+        let kept = Kept { schema, chosen, theme, language, colours, ranges, inspector, expert };
         std::fs::create_dir_all(file.parent().unwrap_or(Path::new(".")))?;
         let text = serde_json::to_string_pretty(&kept)?;
         intrados_stage::file::put(file, |out| out.write_all(text.as_bytes()))
@@ -308,6 +316,18 @@ impl Desk {
     /// The language that the user has chosen; none: as the system has it.
     pub(crate) fn language(&self) -> Option<Language> {
         self.language
+    }
+
+    /// How numbers became colours when that was last kept.
+    pub(crate) fn scales(&self) -> (Colours, Ranges) {
+        self.scales.clone()
+    }
+
+    /// How they do now.
+    pub(crate) fn keep(&mut self, colours: Colours, ranges: &Ranges) {
+        if (self.scales.0, &self.scales.1) != (colours, ranges) {
+            (self.scales, self.is_changed) = ((colours, ranges.clone()), true);
+        }
     }
 
     /// The theme that is to be put on now, if one is.

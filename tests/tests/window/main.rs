@@ -1,5 +1,6 @@
 //! What the window does, without a screen: clicks go through the accessibility tree.
 
+mod colours;
 mod forms;
 mod journey;
 mod languages;

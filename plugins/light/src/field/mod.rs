@@ -28,7 +28,7 @@ pub(crate) use charts::Charts;
 pub use guide::{Culprit, Guide};
 use lobe::{Eight, Eight16, Gates, Haze, Header, Lobe, Piece, Spot, choose};
 pub use train::{Effort, learn};
-pub use view::false_colours;
+pub use view::{false_colours, spread};
 
 /// No cell, no chart.
 pub(crate) const NONE: u32 = u32::MAX;

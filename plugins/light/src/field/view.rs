@@ -6,7 +6,12 @@ use intrados_transport::{Field, Side};
 use rayon::prelude::*;
 
 use super::{Guide, NONE, lobe::Spot};
-use crate::{LitScene, bsdf::warp, sensor::Pinhole};
+use crate::{
+    LitScene,
+    bsdf::warp,
+    sensor::Pinhole,
+    tone::{ColourMap, FalseColour},
+};
 
 /// Where one looks, and what a field knows there.
 struct Look {
@@ -81,25 +86,29 @@ impl Guide {
     }
 }
 
-/// Values as colours (viridis) on a logarithmic scale between the 1st and the 99th of a hundred of
-/// them; grey where there is none. Returns the colours and the range.
+/// Values as colours (viridis) on a logarithmic scale over their [`spread`]; grey where there is
+/// none. Returns the colours and the range.
 #[must_use]
 pub fn false_colours(values: &[f32]) -> (Vec<[u8; 3]>, [f32; 2]) {
+    let range = spread(values);
+    let scale = FalseColour {
+        map: ColourMap::Viridis,
+        range,
+        is_logarithmic: true,
+        bands: 0,
+        is_clipped: false,
+    };
+    (values.iter().map(|&v| scale.encode(v)).collect(), range)
+}
+
+/// The 1st and the 99th of a hundred of those values that are above 0; 1 where there is none.
+#[must_use]
+pub fn spread(values: &[f32]) -> [f32; 2] {
     let mut known: Vec<f32> =
         values.iter().copied().filter(|v| v.is_normal() && *v > 0.0).collect();
     known.sort_by(f32::total_cmp);
     let rank = |share: f32| {
         known.get(((known.len().max(1) - 1) as f32 * share) as usize).copied().unwrap_or(1.0)
     };
-    let [lo, hi] = [rank(0.01), rank(0.99)];
-    let span = (hi / lo).ln().max(1e-3);
-    let colour = |v: f32| {
-        if v.is_nan() {
-            return [96; 3];
-        }
-        let t = f64::from(((v.max(f32::MIN_POSITIVE) / lo).ln() / span).clamp(0.0, 1.0));
-        let colorous::Color { r, g, b } = colorous::VIRIDIS.eval_continuous(t);
-        [r, g, b]
-    };
-    (values.iter().map(|&v| colour(v)).collect(), [lo, hi])
+    [rank(0.01), rank(0.99)]
 }

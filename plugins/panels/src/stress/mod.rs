@@ -13,7 +13,7 @@ use egui::{
     vec2,
 };
 use glam::Vec3;
-use intrados_light::plugin::Widening;
+use intrados_light::{plugin::Widening, tone::FalseColour};
 use intrados_mechanics::{
     analysis::Outcome,
     member::Meshing,
@@ -28,10 +28,11 @@ use intrados_stage::{
 use quantity::Quantity;
 
 use crate::{
-    Actions, Log, Selection, colours,
+    Actions, Colours, Log, Look, Selection, colours,
     lang::{drag, fixed, lines, local, slide, term},
     members,
     number::significant,
+    scale::{self, Ranges},
     surface::{self, Drawn, Surface, bounds, hand, place},
 };
 
@@ -115,7 +116,7 @@ struct Shown {
     faces: Vec<[u32; 4]>,
     positions: Vec<Vec3>,
     values: Vec<f32>,
-    range: [f32; 2],
+    scale: FalseColour,
 }
 
 #[derive(Clone, PartialEq)]
@@ -126,6 +127,8 @@ struct Key {
     count: usize,
     quantity: Quantity,
     scale: f32,
+    colours: Colours,
+    locked: Option<[f32; 2]>,
     part: Option<u32>,
     mesh: bool,
     over: usize,
@@ -154,6 +157,8 @@ pub(crate) fn stress(
     selection: Res<Selection>,
     analyses: Option<Res<Analyses>>,
     at: Res<ShownAt>,
+    look: Res<Look>,
+    mut ranges: ResMut<Ranges>,
     damage: Query<&SurfaceDamage>,
     mut widening: ResMut<Widening>,
     mut stress: ResMut<Stress>,
@@ -202,7 +207,7 @@ pub(crate) fn stress(
     let Some(shot) = analysis.seen.shot(index) else { return };
     let part = skin.parts.iter().position(|p| *p == member.id).map(|p| p as u32);
     let auto = scale_of(&skin, analysis);
-    controls(ui, stress, &skin, auto);
+    controls(ui, stress, &skin, auto, &mut ranges);
     time(ui, stress, &shot, index, count, analysis.work.is_running());
     state(ui, analysis, &member.id);
     cracks(ui, &damage, &mut widening);
@@ -211,10 +216,11 @@ pub(crate) fn stress(
         Rect::from_min_max(area.min, pos2(area.right() - ASIDE - 8.0, area.bottom())),
         Rect::from_min_max(pos2(area.right() - ASIDE, area.top()), area.max),
     ];
-    let view = View { skin: &skin, shot: &shot, analysis, part, index, count, auto };
+    let (skin, shot, colours, ranges) = (&skin, &shot, look.colours, &*ranges);
+    let view = View { skin, shot, analysis, part, index, count, auto, colours, ranges };
     view.show(ui, stress, picture, &mut jobs);
     ui.scope_builder(egui::UiBuilder::new().max_rect(aside), |ui| {
-        plots::show(ui, &skin, &shot, analysis, aside.height());
+        plots::show(ui, skin, shot, analysis, aside.height());
     });
     ui.advance_cursor_after_rect(area);
 }
@@ -346,7 +352,7 @@ fn ended(ui: &mut Ui, outcome: &Outcome, part: &str) {
     });
 }
 
-fn controls(ui: &mut Ui, stress: &mut Stress, skin: &Skin, auto: f32) {
+fn controls(ui: &mut Ui, stress: &mut Stress, skin: &Skin, auto: f32, ranges: &mut Ranges) {
     ui.horizontal_wrapped(|ui| {
         let combo = ComboBox::from_id_salt("stress quantity")
             .width(190.0)
@@ -375,6 +381,13 @@ fn controls(ui: &mut Ui, stress: &mut Stress, skin: &Skin, auto: f32) {
         }
         ui.checkbox(&mut stress.whole_life, tr!("Same colours at all times"))
             .on_hover_text(tr!("One range over the whole life instead of one for each moment"));
+        // Damage goes from 0 to 1 everywhere.
+        let quantity = stress.quantity;
+        let shown = stress.shown.as_ref().filter(|s| s.key.quantity == quantity);
+        if let Some(shown) = shown.filter(|_| quantity != Quantity::Damage) {
+            let unit = term(quantity.unit().0);
+            scale::lock(ui, ranges, &quantity.key(), shown.scale.range, &unit, false);
+        }
     });
 }
 
@@ -484,6 +497,8 @@ struct View<'a> {
     index: usize,
     count: usize,
     auto: f32,
+    colours: Colours,
+    ranges: &'a Ranges,
 }
 
 impl View<'_> {
@@ -574,6 +589,8 @@ impl View<'_> {
             count: if stress.whole_life { stress.life.ranges.len() } else { 0 },
             quantity: stress.quantity,
             scale,
+            colours: self.colours,
+            locked: self.ranges.of(&stress.quantity.key()),
             part,
             mesh: stress.mesh,
             over: 2,
@@ -604,7 +621,7 @@ impl View<'_> {
                     ..s.key.clone()
                 } == key
             })
-            .map(|s| (s.faces, s.values, s.range, s.texture));
+            .map(|s| (s.faces, s.values, s.scale, s.texture));
         let positions: Vec<Vec3> = self
             .skin
             .rest
@@ -612,8 +629,8 @@ impl View<'_> {
             .zip(&self.shot.displacement)
             .map(|(p, u)| *p + scale * *u)
             .collect();
-        let (faces, values, range, texture) = match same {
-            Some((faces, values, range, texture)) => (faces, values, range, Some(texture)),
+        let (faces, values, colours, texture) = match same {
+            Some((faces, values, colours, texture)) => (faces, values, colours, Some(texture)),
             None => {
                 let outside = self
                     .skin
@@ -623,7 +640,9 @@ impl View<'_> {
                 let (faces, values): (Vec<[u32; 4]>, _) =
                     (outside.map(|f| f.corners).collect(), quantity.values(self.skin, self.shot));
                 let range = self.range(stress, &values, &faces);
-                (faces, values, range, stress.shown.take().map(|s| s.texture))
+                let key = quantity.key();
+                let colours = self.colours.locked_or_over(range, false, &key, self.ranges);
+                (faces, values, colours, stress.shown.take().map(|s| s.texture))
             }
         };
         let density = ui.ctx().pixels_per_point();
@@ -636,7 +655,8 @@ impl View<'_> {
             mesh: stress.mesh,
             sun: None,
         };
-        let drawn = surface::draw(camera, size, key.over, &surface, |v| quantity.colour(range, v));
+        let drawn =
+            surface::draw(camera, size, key.over, &surface, |v| quantity.colour(&colours, v));
         let texture = match texture {
             Some(mut texture) => {
                 texture.set(drawn.image.clone(), TextureOptions::LINEAR);
@@ -644,7 +664,8 @@ impl View<'_> {
             }
             None => ui.ctx().load_texture("stress", drawn.image.clone(), TextureOptions::LINEAR),
         };
-        stress.shown = Some(Shown { key, drawn, texture, faces, positions, values, range });
+        let scale = colours;
+        stress.shown = Some(Shown { key, drawn, texture, faces, positions, values, scale });
     }
 
     fn range(&self, stress: &Stress, values: &[f32], faces: &[[u32; 4]]) -> [f32; 2] {
@@ -713,7 +734,7 @@ impl View<'_> {
 
     /// What the picture shows, in a line.
     fn caption(&self, quantity: Quantity, shown: &Shown) -> String {
-        let [low, high] = shown.range.map(|v| significant(f64::from(v), 3));
+        let [low, high] = shown.scale.range.map(|v| significant(f64::from(v), 3));
         tr!(
             "{}, {} to {} {}, {}, displacements × {}; Intrados {}",
             quantity.name(self.skin),
@@ -767,31 +788,34 @@ impl View<'_> {
 
 /// Colours with their values, and the true extremes.
 fn legend(ui: &Ui, rect: Rect, quantity: Quantity, name: &str, shown: &Shown) {
-    const STEPS: usize = 64;
     let painter = ui.painter().with_clip_rect(rect);
     let height = (rect.height() * 0.6).clamp(60.0, 260.0);
     let bar = Rect::from_min_size(pos2(rect.right() - 84.0, rect.top() + 42.0), vec2(14.0, height));
-    let [low, high] = shown.range;
+    let [low, high] = shown.scale.range;
     // The picture may reach under it.
     let behind = Rect::from_min_max(
         pos2(bar.left() - 6.0, rect.top()),
         pos2(rect.right(), bar.bottom() + 40.0),
     );
     painter.rect_filled(behind, 0.0, ui.visuals().extreme_bg_color.gamma_multiply(0.75));
-    for k in 0..STEPS {
-        let value = low + (high - low) * (k as f32 + 0.5) / STEPS as f32;
-        let [r, g, b] = quantity.colour(shown.range, value);
-        let y = |k: usize| bar.bottom() - bar.height() * k as f32 / STEPS as f32;
+    let steps = scale::steps(&shown.scale);
+    for k in 0..steps {
+        let value = scale::at(&shown.scale, (f32::from(k) + 0.5) / f32::from(steps));
+        let y = |k: u8| bar.bottom() - bar.height() * f32::from(k) / f32::from(steps);
         painter.rect_filled(
             Rect::from_min_max(pos2(bar.left(), y(k + 1)), pos2(bar.right(), y(k) + 0.5)),
             0.0,
-            Color32::from_rgb(r, g, b),
+            scale::ink(quantity.colour(&shown.scale, value)),
         );
     }
+    scale::ends(&painter, &shown.scale, bar, true);
     let (font, colour) = (egui::TextStyle::Small.resolve(ui.style()), ui.visuals().text_color());
-    for k in 0..=4 {
-        let value = low + (high - low) * k as f32 / 4.0;
-        let y = bar.bottom() - bar.height() * k as f32 / 4.0;
+    // Where bands meet, if there are some.
+    let parts = if shown.scale.bands < 2 { 4 } else { 5 };
+    for k in 0..=parts {
+        let share = k as f32 / parts as f32;
+        let value = scale::at(&shown.scale, share);
+        let y = bar.bottom() - bar.height() * share;
         painter.hline(bar.right()..=bar.right() + 3.0, y, (1.0, colour));
         let text = if value.abs() < 1e-4 * (high - low) {
             "0".into()

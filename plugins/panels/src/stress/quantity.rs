@@ -1,14 +1,14 @@
 //! What of an equilibrium is shown, its unit, its colours.
 
 use glam::DVec3;
-use intrados_light::tone::ColourMap;
+use intrados_light::tone::FalseColour;
 use intrados_mechanics::{
     skin::{Skin, Snapshot},
     tensor::{Principal, cylindrical, rotate_stress, von_mises},
 };
 use rayon::prelude::*;
 
-use crate::lang::term;
+use crate::{colours, lang::term};
 
 /// What is shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -122,13 +122,23 @@ impl Quantity {
         matches!(self, Self::First | Self::Third | Self::Component(_))
     }
 
-    /// The colour of a value: of signed ones blue is compression and red tension, of others
-    /// viridis.
-    pub(crate) fn colour(self, [low, high]: [f32; 2], value: f32) -> [u8; 3] {
-        if !self.has_sign() {
-            return ColourMap::Viridis.at((value - low) / (high - low));
+    /// By what name its range is locked.
+    pub(crate) fn key(self) -> String {
+        format!("stress {self:?}")
+    }
+
+    /// The colour of a value: of signed ones blue is compression and red tension, damage has its own
+    /// scale everywhere, and others have the window's colours.
+    pub(crate) fn colour(self, scale: &FalseColour, value: f32) -> [u8; 3] {
+        let [low, high] = scale.range;
+        match scale.place(value) {
+            Err(other) => other,
+            Ok(t) if self.has_sign() => {
+                signed((low + t * (high - low)) / high.max(-low).max(f32::MIN_POSITIVE))
+            }
+            Ok(t) if self == Self::Damage => colours::damage(t, false),
+            Ok(t) => scale.map.at(t),
         }
-        signed(value / high.max(-low))
     }
 }
 
@@ -157,6 +167,8 @@ fn turned(skin: &Skin, v: usize, stress: &[f64; 6]) -> [f64; 6] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Colours;
+    use intrados_light::tone::ColourMap;
 
     #[test]
     fn ranges_keep_zero_and_forget_the_sharpest_corner() {
@@ -173,10 +185,38 @@ mod tests {
         assert_eq!(Quantity::Mises.range(std::iter::repeat_n(0.0, 9)), [0.0, 1e-3]);
     }
 
+    fn over(range: [f32; 2], map: ColourMap) -> FalseColour {
+        Colours { map, bands: 0 }.over(range, false)
+    }
+
     #[test]
     fn compression_is_blue_and_tension_red() {
-        let [c, t] = [-2.0, 2.0].map(|v| Quantity::First.colour([-2.0, 2.0], v));
+        let scale = over([-2.0, 2.0], ColourMap::Grey);
+        let [c, t] = [-2.0, 2.0].map(|v| Quantity::First.colour(&scale, v));
         assert!(c[2] > c[0] && t[0] > t[2]);
-        assert_eq!(Quantity::First.colour([-2.0, 2.0], 0.0), [240, 240, 238]);
+        assert_eq!(Quantity::First.colour(&scale, 0.0), [240, 240, 238]);
+        // In a range that reaches farther one way, too: pale is nothing.
+        let uneven = over([-2.0, 6.0], ColourMap::Grey);
+        assert_eq!(Quantity::First.colour(&uneven, 0.0), [240, 240, 238]);
+        assert_eq!(Quantity::First.colour(&uneven, 6.0), t);
+    }
+
+    #[test]
+    fn only_what_has_no_sign_and_is_no_damage_has_the_colours_of_the_window() {
+        for map in ColourMap::ALL {
+            let scale = over([0.0, 1.0], map);
+            assert_eq!(Quantity::Mises.colour(&scale, 1.0), map.at(1.0));
+            assert_eq!(Quantity::Damage.colour(&scale, 1.0), colours::damage(1.0, false));
+        }
+    }
+
+    #[test]
+    fn bands_of_what_has_a_sign_are_so_many_colours() {
+        let scale = FalseColour { bands: 5, ..over([-3.0, 3.0], ColourMap::Viridis) };
+        let mut seen: Vec<[u8; 3]> =
+            (-300..=300).map(|i| Quantity::First.colour(&scale, i as f32 / 100.0)).collect();
+        seen.dedup();
+        assert_eq!(seen.len(), 5);
+        assert_eq!(seen[2], [240, 240, 238]);
     }
 }
