@@ -11,7 +11,7 @@ use intrados_scene::{
 };
 
 use crate::{
-    Banners, Language, Log, Look, Quantity, Refine, Selection, Viewpoint, Workspace,
+    Banners, Jump, Language, Log, Look, Quantity, Refine, Selection, Viewpoint, Workspace,
     attach::Form,
     command::Palette,
     create::Creation,
@@ -22,6 +22,7 @@ use crate::{
     history::History,
     layout::Layout,
     photos::Photos,
+    play,
     recent::Recent,
     saving::{Saving, Taken},
     structure::{self, Structure},
@@ -67,6 +68,10 @@ pub enum Action {
     Select(Option<usize>),
     /// Select the next member of the list, or the one before.
     Step(bool),
+    /// Go to another equilibrium of the lives of the members.
+    Jump(Jump),
+    /// Go through them by itself, or stop.
+    Play,
     /// Bring a panel to the front, by its name; it is opened where it was closed.
     Tab(&'static str),
     /// Open a panel, or close it.
@@ -230,6 +235,8 @@ fn carry_out(world: &mut World, action: Action) {
             world.resource_mut::<Selection>().set_if_neq(Selection(member));
         }
         Action::Step(forward) => step(world, forward),
+        Action::Jump(to) => play::jump(world, to),
+        Action::Play => play::toggle(world),
         Action::Tab(name) => show_tab(world, name),
         Action::Panel(name, true) => show_tab(world, &name),
         Action::Panel(name, false) => world.resource_mut::<Desk>().close(&name),

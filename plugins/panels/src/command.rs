@@ -7,7 +7,7 @@ use intrados_light::View;
 use intrados_scene::plugin::CurrentScene;
 
 use crate::{
-    Action, Actions, Language, Look, Quantity, Workspace,
+    Action, Actions, Jump, Language, Look, Quantity, Workspace,
     lang::{self, term},
     layout::Layout,
     place::Panels,
@@ -114,6 +114,16 @@ fn fixed(look: &Look) -> Vec<Command> {
         command(tr!("lay panels out as at first"), "", None, Action::ResetLayout),
         command(tr!("next member"), "Page down", by(NONE, Key::PageDown), Action::Step(true)),
         command(tr!("previous member"), "Page up", by(NONE, Key::PageUp), Action::Step(false)),
+        command(tr!("play the lives of the members, or stop"), "P", by(NONE, Key::P), Action::Play),
+        command(tr!("next equilibrium"), ".", by(NONE, Key::Period), Action::Jump(Jump::Forward)),
+        command(tr!("equilibrium before"), ",", by(NONE, Key::Comma), Action::Jump(Jump::Back)),
+        command(
+            tr!("first equilibrium"),
+            "Ctrl+Home",
+            by(CTRL, Key::Home),
+            Action::Jump(Jump::First),
+        ),
+        command(tr!("last equilibrium"), "Ctrl+End", by(CTRL, Key::End), Action::Jump(Jump::Last)),
         command(
             tr!("fit the selected member, or everything, into the picture"),
             "F",
@@ -205,7 +215,7 @@ pub(crate) fn keys(ui: &Ui, world: &mut World) {
     let has_focus = ui.ctx().memory(|m| m.focused().is_some());
     let commands = fixed(world.resource::<Look>());
     let acts_anywhere = |modifiers: Modifiers, key: Key| {
-        modifiers.command && !matches!(key, Key::Z | Key::Y)
+        modifiers.command && !matches!(key, Key::Z | Key::Y | Key::Home | Key::End)
             || matches!(key, Key::F1 | Key::F9 | Key::F11 | Key::F12)
     };
     let asked: Vec<Action> = ui.input_mut(|i| {

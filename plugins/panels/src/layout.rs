@@ -35,6 +35,7 @@ use crate::{
     photos::Photos,
     picture::Picture,
     place::Panels,
+    play,
     recent::Recent,
     report::Report,
     saving::{self, Saving},
@@ -178,6 +179,7 @@ pub fn show(ui: &mut Ui, world: &mut World) {
     // Before the keys: while it is open, it takes them.
     command::palette(ui, world);
     command::keys(ui, world);
+    play::go_on(ui, world);
     let [start, sheet, form, saving, creation] = own(world);
     session::offer(ui, world);
     banner::show(ui, world);

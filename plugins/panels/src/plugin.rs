@@ -10,8 +10,8 @@ use crate::{
     Actions, AddPanel, Banners, Language, Latest, Log, Look, Place, Refine, Selection, Statistics,
     Viewpoint, action, attach, banner, command, convergence, create, ct, dialog, directions, drops,
     edits, export, fields, history, inspector, layout, log, members, meters, moment, outline,
-    photos, picture, place::Panels, prediction, recent, refine, render, report, saving, session,
-    sheet, statistics, steering, stress, structure, toast, viewpoint, workspace,
+    photos, picture, place::Panels, play, prediction, recent, refine, render, report, saving,
+    session, sheet, statistics, steering, stress, structure, toast, viewpoint, workspace,
 };
 
 /// Adds the window's state and the built-in panels. It opens no window: whoever has one calls
@@ -59,6 +59,7 @@ impl Plugin for PanelsPlugin {
             .init_resource::<history::History>()
             .init_resource::<moment::Moment>()
             .init_resource::<moment::Courses>()
+            .init_resource::<play::Play>()
             .init_resource::<Log>()
             .init_resource::<picture::Picture>()
             .init_resource::<picture::Cursor>()

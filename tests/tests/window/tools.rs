@@ -2,6 +2,7 @@
 
 use std::{fs, path::Path};
 
+use egui::{Key, Modifiers};
 use egui_kittest::kittest::{NodeT, Queryable};
 use intrados_forecast::ForecastSettings;
 use intrados_light::Render;
@@ -141,10 +142,8 @@ fn keeping(file: &Path) -> Window {
     Window::of(app)
 }
 
-/// The slider goes through the lives of the members: as they were, as they are known now, as they
-/// are forecast; all that shows members follows it.
-#[test]
-fn the_slider_goes_through_the_lives_of_members() {
+/// A column whose life is known and forecast.
+fn with_life() -> (Window, tempfile::TempDir) {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("column.ron");
     fs::write(&file, intrados_scene::parametric::template("column").expect("a template"))
@@ -159,6 +158,14 @@ fn the_slider_goes_through_the_lives_of_members() {
         w.get_resource::<Latest>().is_some_and(|l| l.result.is_some())
     });
     window.frames(3);
+    (window, folder)
+}
+
+/// The slider goes through the lives of the members: as they were, as they are known now, as they
+/// are forecast; all that shows members follows it.
+#[test]
+fn the_slider_goes_through_the_lives_of_members() {
+    let (mut window, _folder) = with_life();
     let shown = |window: &Window| window.with(|w| *w.resource::<ShownAt>());
     assert_eq!(shown(&window), ShownAt(None));
     let now = window.picture();
@@ -180,6 +187,48 @@ fn the_slider_goes_through_the_lives_of_members() {
     window.ask(Action::Select(Some(0)));
     window.frames(3);
     assert!(has(&window, "d of the worst zone by its life"), "the sheet has no course");
+}
+
+/// Keys go from one equilibrium to the next; playing shows the same ones by itself, and stops at the
+/// last.
+#[test]
+fn playing_shows_all_equilibria_and_stops_at_the_last() {
+    let (mut window, _folder) = with_life();
+    let shown = |window: &Window| window.with(|w| *w.resource::<ShownAt>());
+    let to_first = |window: &mut Window| {
+        window.harness.key_press_modifiers(Modifiers::COMMAND, Key::Home);
+        window.frames(2);
+        shown(window)
+    };
+    let mut stepped = vec![to_first(&mut window)];
+    loop {
+        window.harness.key_press(Key::Period);
+        window.frames(2);
+        if stepped.last() == Some(&shown(&window)) {
+            break;
+        }
+        stepped.push(shown(&window));
+    }
+    assert!(stepped.len() > 3, "{stepped:?}");
+    window.harness.key_press(Key::Comma);
+    window.frames(2);
+    assert_eq!(Some(&shown(&window)), stepped.iter().rev().nth(1));
+    let mut played = vec![to_first(&mut window)];
+    window.click("▶ Play");
+    assert!(has(&window, "⏸ Pause"));
+    while has(&window, "⏸ Pause") {
+        window.frame();
+        if played.last() != Some(&shown(&window)) {
+            played.push(shown(&window));
+        }
+    }
+    assert_eq!(played, stepped);
+    window.harness.key_press(Key::P);
+    window.frames(2);
+    assert_eq!(shown(&window), stepped[0], "from the last it begins anew");
+    window.harness.key_press(Key::P);
+    window.frames(2);
+    assert!(!has(&window, "⏸ Pause"), "the same key stops it");
 }
 
 /// As it looks: the path-traced picture comes from where the structure is looked at, and goes again.
