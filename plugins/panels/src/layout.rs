@@ -263,7 +263,11 @@ fn status(ui: &mut Ui, world: &mut World) {
             && let Some(line) = world.resource::<Log>().lines().last()
             && !line.starts_with('⚠')
         {
-            ui.add(egui::Label::new(egui::RichText::new(line).weak()).truncate());
+            let line = egui::Label::new(egui::RichText::new(line).weak()).truncate();
+            let hint = tr!("All that was said is in the log; a click opens it");
+            if ui.add(line.sense(egui::Sense::click())).on_hover_text(hint).clicked() {
+                world.resource_mut::<Actions>().ask(Action::Tab("Log"));
+            }
         }
     });
 }
@@ -333,6 +337,10 @@ fn menu(ui: &mut Ui, world: &mut World) {
             ui.checkbox(&mut look.outline, tr!("Outline the selected member"));
             world.resource_mut::<Look>().set_if_neq(look);
             ui.separator();
+            let log = ui.button(tr!("Log of this session"));
+            if log.on_hover_text(tr!("All that was said, read again")).clicked() {
+                asked.push(Action::Tab("Log"));
+            }
             arrangement(ui, world, &mut asked);
         });
         if ui.button(tr!("Commands")).on_hover_text("Ctrl+P").clicked() {
