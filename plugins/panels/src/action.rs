@@ -26,6 +26,7 @@ use crate::{
     recent::Recent,
     saving::{Saving, Taken},
     structure::{self, Structure},
+    views::{self, Views},
     workspace::{self, Desk},
 };
 
@@ -60,6 +61,14 @@ pub enum Action {
     Home,
     /// Another camera of the scene, by its place in the list.
     Camera(usize),
+    /// Look from a view that is kept of the scene, by its place in the list.
+    View(usize),
+    /// Keep where the picture that is in sight looks from, by a name or the next number.
+    KeepView(String),
+    /// Keep it no longer.
+    ForgetView(usize),
+    /// Show or hide the list of views.
+    Views,
     /// Look at another side.
     Show(View),
     /// Light or its error.
@@ -228,6 +237,13 @@ fn carry_out(world: &mut World, action: Action) {
                 world.resource_mut::<Viewpoint>().go(camera);
             }
         }
+        Action::View(index) => views::go(world, index),
+        Action::KeepView(name) => views::keep(world, &name),
+        Action::ForgetView(index) => views::forget(world, index),
+        Action::Views => {
+            let mut views = world.resource_mut::<Views>();
+            views.is_open = !views.is_open;
+        }
         Action::Frame => frame(world),
         Action::Show(view) => world.resource_mut::<Look>().view = view,
         Action::ShowQuantity(quantity) => world.resource_mut::<Look>().quantity = quantity,
@@ -372,6 +388,7 @@ fn dismiss(world: &mut World) {
     if world.resource_mut::<Saving>().dismiss()
         || std::mem::take(&mut world.resource_mut::<Form>().is_open)
         || std::mem::take(&mut world.resource_mut::<Creation>().is_open)
+        || std::mem::take(&mut world.resource_mut::<Views>().is_open)
         || std::mem::take(&mut world.resource_mut::<Layout>().keys)
         || world.resource_mut::<Banners>().dismiss()
     {

@@ -13,6 +13,7 @@ use crate::{
     place::Panels,
     recent::Recent,
     saving::Taken,
+    views::Views,
     workspace::Desk,
 };
 
@@ -136,6 +137,8 @@ fn fixed(look: &Look) -> Vec<Command> {
             by(NONE, Key::Home),
             Action::Home,
         ),
+        command(tr!("keep this view"), "", None, Action::KeepView(String::new())),
+        command(tr!("list of views, to name and to forget them"), "", None, Action::Views),
         command(tr!("pause or continue"), "Space", by(NONE, Key::Space), Action::Pause),
         command(tr!("restart the picture"), "R", by(NONE, Key::R), Action::Restart),
         command(tr!("primal side"), "1", by(NONE, Key::Num1), Action::Show(View::Primal)),
@@ -189,6 +192,10 @@ fn all(world: &World) -> Vec<Command> {
         for (index, camera) in scene.0.cameras.iter().enumerate() {
             let name = tr!("camera: {}", camera.name);
             all.push(command(name, "", None, Action::Camera(index)));
+        }
+        let views = world.resource::<Views>().of(&scene.0.path);
+        for (index, view) in views.iter().enumerate() {
+            all.push(command(tr!("view: {}", view.name), "", None, Action::View(index)));
         }
     }
     for path in world.resource::<Recent>().list() {

@@ -41,7 +41,7 @@ use crate::{
     saving::{self, Saving},
     session, start,
     stress::Stress,
-    toast,
+    toast, views,
     workspace::{self, Desk},
 };
 
@@ -322,17 +322,7 @@ fn menu(ui: &mut Ui, world: &mut World) {
                     asked.push(action);
                 }
             }
-            let cameras = scene.as_ref().map(|s| s.cameras.len()).unwrap_or_default();
-            ui.menu_button(tr!("Cameras"), |ui| {
-                for (i, camera) in scene.iter().flat_map(|s| &s.cameras).enumerate() {
-                    if ui.button(&camera.name).clicked() {
-                        asked.push(Action::Camera(i));
-                    }
-                }
-                if cameras == 0 {
-                    ui.weak(tr!("The scene has none of its own."));
-                }
-            });
+            ui.menu_button(tr!("Views"), |ui| views::menu(ui, world, &mut asked));
             let mut look = *world.resource::<Look>();
             ui.checkbox(&mut look.outline, tr!("Outline the selected member"));
             world.resource_mut::<Look>().set_if_neq(look);
@@ -447,6 +437,7 @@ fn sheets(
             .anchor(egui::Align2::CENTER_CENTER, [0.0, 0.0])
     };
     command::sheet(ui, world);
+    views::sheet(ui, world);
     let mut open = world.resource::<Form>().is_open;
     if open {
         // It may be drawn aside, to see where on the member something is.

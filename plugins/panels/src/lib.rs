@@ -50,6 +50,7 @@ mod surface;
 mod toast;
 mod values;
 mod viewpoint;
+mod views;
 mod window;
 mod workspace;
 mod zoom;

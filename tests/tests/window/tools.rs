@@ -9,7 +9,7 @@ use intrados_light::Render;
 use intrados_mechanics::plugin::{Analyses, ShownAt};
 use intrados_panels::{Action, Latest, PanelsPlugin, Selection, Viewpoint};
 use intrados_predict::{PredictSettings, Predicting};
-use intrados_scene::plugin::CurrentScene;
+use intrados_scene::{Camera, plugin::CurrentScene};
 use intrados_stage::Work;
 
 use super::{LONELY, Window, press, rest, type_into, with_column, with_lonely};
@@ -229,6 +229,39 @@ fn playing_shows_all_equilibria_and_stops_at_the_last() {
     window.harness.key_press(Key::P);
     window.frames(2);
     assert!(!has(&window, "⏸ Pause"), "the same key stops it");
+}
+
+/// A view that was kept by its name is gone to from elsewhere, by the palette, and forgotten.
+#[test]
+fn a_kept_view_is_gone_to_and_forgotten() {
+    let mut window = Window::with_scene("cornell");
+    let camera = |window: &Window| {
+        window.with(|w| w.resource::<Viewpoint>().camera().cloned()).expect("a camera")
+    };
+    let home = camera(&window);
+    let there = Camera { position: home.position + 0.2 * home.up, ..home.clone() };
+    window.with(|w| w.resource_mut::<Viewpoint>().go(there.clone()));
+    window.ask(Action::Views);
+    window.frames(3);
+    type_into(&mut window, "Name of the view", "the lamp");
+    window.click("Keep this view");
+    assert!(window.harness.query_by_label("the lamp").is_some(), "it is not listed");
+    window.ask(Action::Dismiss);
+    window.ask(Action::Home);
+    window.frames(2);
+    assert!(window.harness.query_by_label("Name of the view").is_none(), "it is put away");
+    assert_eq!(camera(&window), home);
+    window.ask(Action::Palette);
+    window.frames(3);
+    window.harness.get_by_label("Command").type_text("view lamp");
+    window.frames(2);
+    window.harness.key_press(Key::Enter);
+    window.frames(3);
+    assert_eq!(camera(&window), there);
+    window.ask(Action::Views);
+    window.frames(3);
+    window.click("Forget the view the lamp");
+    assert!(window.harness.query_by_label("the lamp").is_none(), "it is still listed");
 }
 
 /// As it looks: the path-traced picture comes from where the structure is looked at, and goes again.

@@ -13,7 +13,7 @@ use std::sync::Arc;
 use bevy_ecs::prelude::*;
 use egui::{Rect, Ui, vec2};
 use glam::Vec3;
-use intrados_scene::{Scene, plugin::CurrentScene};
+use intrados_scene::{Camera, Scene, plugin::CurrentScene};
 use intrados_stage::Jobs;
 use measure::Tape;
 use model::Scale;
@@ -88,6 +88,17 @@ impl Default for Structure {
 impl Structure {
     pub(crate) fn look(&mut self, view: View) {
         self.wished = Some(view);
+    }
+
+    /// Where it is looked at from, once it was shown.
+    pub(crate) fn camera(&self) -> Option<&Camera> {
+        self.model.camera()
+    }
+
+    /// Looks from there.
+    pub(crate) fn follow(&mut self, camera: &Camera) {
+        self.model.follow(camera);
+        self.earlier.follow(camera);
     }
 
     /// Where the evidence is that a form asks for.
