@@ -24,6 +24,7 @@ use crate::{
     photos::Photos,
     play,
     recent::Recent,
+    reference::{self, Reference},
     saving::{Saving, Taken},
     structure::{self, Structure},
     views::{self, Views},
@@ -73,6 +74,10 @@ pub enum Action {
     Show(View),
     /// Light or its error.
     ShowQuantity(Quantity),
+    /// Keep the picture of light, to hold later ones against it.
+    KeepReference,
+    /// Keep it no longer.
+    LetReferenceGo,
     /// Select a member, or nothing.
     Select(Option<usize>),
     /// Select the next member of the list, or the one before.
@@ -247,6 +252,8 @@ fn carry_out(world: &mut World, action: Action) {
         Action::Frame => frame(world),
         Action::Show(view) => world.resource_mut::<Look>().view = view,
         Action::ShowQuantity(quantity) => world.resource_mut::<Look>().quantity = quantity,
+        Action::KeepReference => reference::keep(world),
+        Action::LetReferenceGo => *world.resource_mut::<Reference>() = Reference::default(),
         Action::Select(member) => {
             world.resource_mut::<Selection>().set_if_neq(Selection(member));
         }

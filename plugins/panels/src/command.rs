@@ -145,6 +145,8 @@ fn fixed(look: &Look) -> Vec<Command> {
         command(tr!("dual side"), "2", by(NONE, Key::Num2), Action::Show(View::Dual)),
         command(tr!("both sides combined"), "3", by(NONE, Key::Num3), Action::Show(View::Combined)),
         command(tr!("light or error"), "E", by(NONE, Key::E), Action::ShowQuantity(quantity)),
+        command(tr!("keep the picture as reference"), "", None, Action::KeepReference),
+        command(tr!("let the reference go"), "", None, Action::LetReferenceGo),
         command(tr!("go on with the prediction"), "", None, Action::Predict),
         command(tr!("compare with an earlier prediction"), "", None, Action::ChoosePrediction),
         command(tr!("reload the scene"), "", None, Action::Reload),

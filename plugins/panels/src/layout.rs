@@ -37,6 +37,7 @@ use crate::{
     place::Panels,
     play,
     recent::Recent,
+    reference::Reference,
     report::Report,
     saving::{self, Saving},
     session, start,
@@ -158,6 +159,7 @@ pub fn is_busy(world: &mut World) -> bool {
         || world.resource::<Learning>().is_coming()
         || world.resource::<Fields>().is_busy()
         || world.resource::<Picture>().is_behind()
+        || world.resource::<Reference>().is_behind()
         || world.resource::<Dialogs>().is_open()
         || world.resource::<Outline>().is_busy()
         || world.resource::<Ct>().is_busy()

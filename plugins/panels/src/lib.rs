@@ -35,6 +35,7 @@ mod play;
 mod plugin;
 mod prediction;
 mod recent;
+mod reference;
 mod refine;
 mod render;
 mod report;

@@ -19,6 +19,7 @@ use crate::{
     orbit,
     outline::Outline,
     picture::{Cursor, ERRORS, Picture, Under},
+    reference::{self, Reference},
     steering,
 };
 
@@ -33,6 +34,7 @@ pub(crate) fn render(
     mut refine: ResMut<Refine>,
     mut viewpoint: ResMut<Viewpoint>,
     mut picture: ResMut<Picture>,
+    mut reference: ResMut<Reference>,
     mut outline: ResMut<Outline>,
     mut learning: ResMut<Learning>,
     mut fields: ResMut<Fields>,
@@ -41,14 +43,21 @@ pub(crate) fn render(
     statistics: Res<Statistics>,
     mut actions: ResMut<Actions>,
 ) {
-    toolbar(ui, &mut look, &mut refine, &mut learning, &mut actions);
+    let reference = reference.bypass_change_detection();
+    let may_keep = render.is_some() && !viewpoint.is_preview();
+    toolbar(ui, &mut look, &mut refine, &mut learning, may_keep, &mut actions);
+    reference.choice(ui, &mut actions);
     status(ui, &look, refine.bypass_change_detection(), &viewpoint, &statistics, render.as_deref());
     let (Some(render), Some(lit)) = (render, lit) else {
         cursor.set_if_neq(Cursor(None));
         ui.centered_and_justified(|ui| ui.spinner());
         return;
     };
-    let legend = if look.quantity == Quantity::Radiance { 0.0 } else { 44.0 };
+    let legend = match look.quantity {
+        Quantity::Radiance if reference.is_kept() => reference::FIGURES,
+        Quantity::Radiance => 0.0,
+        Quantity::Error | Quantity::Field(_) => 44.0,
+    };
     let area = ui.available_rect_before_wrap();
     let camera = viewpoint.camera().unwrap_or(render.camera()).clone();
     let rect = fit(
@@ -70,10 +79,16 @@ pub(crate) fn render(
     } else if let Some(texture) = picture.bypass_change_detection().texture(ui.ctx()) {
         ui.painter().image(texture.id(), rect, whole, Color32::WHITE);
     }
+    if look.quantity == Quantity::Radiance {
+        reference.draw(ui, rect, look.exposure);
+    }
     if let Some(texture) = outline.bypass_change_detection().texture(ui.ctx()) {
         ui.painter().image(texture.id(), rect, whole, Color32::WHITE);
     }
     hand(ui, &response, rect, &mut viewpoint);
+    if look.quantity == Quantity::Radiance {
+        reference.divider(ui, rect);
+    }
     let under = response.hover_pos().map(|at| under(&lit, render.camera(), rect, at));
     cursor.set_if_neq(Cursor(under));
     if response.clicked() {
@@ -93,7 +108,7 @@ pub(crate) fn render(
         pos2(rect.right(), rect.bottom() + 42.0),
     );
     match look.quantity {
-        Quantity::Radiance => {}
+        Quantity::Radiance => reference.figures(ui, below),
         Quantity::Error => {
             let caption = tr!("relative standard error of a pixel (logarithmic; grey: unknown)");
             let share = |error: f32| local(format!("{} %", 100.0 * error));
@@ -189,6 +204,7 @@ fn toolbar(
     look: &mut ResMut<Look>,
     refine: &mut ResMut<Refine>,
     learning: &mut ResMut<Learning>,
+    may_keep: bool,
     actions: &mut Actions,
 ) {
     let mut new = **look;
@@ -231,6 +247,8 @@ fn toolbar(
         if ui.add(field.suffix(" %")).labelled_by(label.id).changed() {
             refine.target = target / 100.0;
         }
+        ui.separator();
+        reference::button(ui, may_keep, actions);
     });
     ui.horizontal(|ui| {
         steering::choice(ui, learning);

@@ -2,12 +2,13 @@
 
 use std::{fs, path::Path};
 
+use bevy_ecs::world::World;
 use egui::{Key, Modifiers};
 use egui_kittest::kittest::{NodeT, Queryable};
 use intrados_forecast::ForecastSettings;
 use intrados_light::Render;
 use intrados_mechanics::plugin::{Analyses, ShownAt};
-use intrados_panels::{Action, Latest, PanelsPlugin, Selection, Viewpoint};
+use intrados_panels::{Action, Latest, Log, PanelsPlugin, Selection, Viewpoint};
 use intrados_predict::{PredictSettings, Predicting};
 use intrados_scene::{Camera, plugin::CurrentScene};
 use intrados_stage::Work;
@@ -262,6 +263,73 @@ fn a_kept_view_is_gone_to_and_forgotten() {
     window.frames(3);
     window.click("Forget the view the lamp");
     assert!(window.harness.query_by_label("the lamp").is_none(), "it is still listed");
+}
+
+/// A reference is held against the picture: by its figures, and under a divider that is dragged
+/// instead of the camera; with the camera it goes.
+#[test]
+fn a_picture_is_held_against_its_reference() {
+    let mut window = Window::with_scene("cornell");
+    window.click("Primal");
+    window.until("some light", |w| w.resource::<Render>().samples_per_pixel() > 4.0);
+    window.click("⏸ Pause");
+    window.click("Keep as reference");
+    window.frames(20);
+    assert!(window.harness.query_by_label("relMSE 0").is_some(), "it is its own reference");
+    window.click("Dual");
+    window.frames(20);
+    assert!(has(&window, "relMSE ") && window.harness.query_by_label("relMSE 0").is_none());
+    let rect = window.harness.get_by_label("Picture").rect();
+    let seen = |window: &mut Window, shown: &str| {
+        window.click(shown);
+        window.frames(3);
+        columns(&window.picture(), rect)
+    };
+    let [own, reference] = ["This picture", "Reference"].map(|shown| seen(&mut window, shown));
+    let difference = seen(&mut window, "Difference");
+    let wiped = seen(&mut window, "Wipe");
+    assert!(own != reference && difference != own && difference != reference);
+    let count = own.len();
+    let (middle, aside) = (count / 2, 8);
+    assert_eq!(wiped[..middle - aside], reference[..middle - aside]);
+    assert_eq!(wiped[middle + aside..], own[middle + aside..]);
+    let camera = window.with(|w| w.resource::<Viewpoint>().camera().cloned());
+    drag(&mut window, rect, [0.5, 0.25]);
+    let wiped = columns(&window.picture(), rect);
+    assert_eq!(wiped[count / 4 + aside..], own[count / 4 + aside..], "the divider stays");
+    assert_eq!(wiped[..count / 4 - aside], reference[..count / 4 - aside]);
+    assert_eq!(window.with(|w| w.resource::<Viewpoint>().camera().cloned()), camera);
+    window.with(|w| {
+        let there = camera.clone().map(|c| Camera { fov_deg: 0.9 * c.fov_deg, ..c });
+        w.resource_mut::<Viewpoint>().go(there.expect("a camera"));
+    });
+    window.frames(3);
+    assert!(window.harness.query_by_label("Wipe").is_none(), "it is kept for another camera");
+    let said = |w: &mut World| w.resource::<Log>().lines().iter().any(|l| l.contains("is let go"));
+    assert!(window.with(said));
+}
+
+/// Columns of what is seen there.
+fn columns(picture: &image::RgbImage, rect: egui::Rect) -> Vec<Vec<[u8; 3]>> {
+    let range = |from: f32, to: f32| from.ceil() as u32 + 1..to.floor() as u32 - 1;
+    let rows = range(rect.top(), rect.bottom());
+    let column = |x: u32| rows.clone().map(|y| picture.get_pixel(x, y).0).collect();
+    range(rect.left(), rect.right()).map(column).collect()
+}
+
+/// Drags from one share of the width to another, at half the height.
+fn drag(window: &mut Window, rect: egui::Rect, [from, to]: [f32; 2]) {
+    let at = |x: f32| rect.lerp_inside(egui::vec2(x, 0.5));
+    window.harness.hover_at(at(from));
+    window.frames(2);
+    window.harness.drag_at(at(from));
+    window.frames(2);
+    for k in 1..=4 {
+        window.harness.hover_at(at(from + (to - from) * k as f32 / 4.0));
+        window.frame();
+    }
+    window.harness.drop_at(at(to));
+    window.frames(3);
 }
 
 /// As it looks: the path-traced picture comes from where the structure is looked at, and goes again.
