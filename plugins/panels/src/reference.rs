@@ -14,7 +14,7 @@ use intrados_scene::Camera;
 use rayon::prelude::*;
 
 use crate::{
-    Action, Actions, Log, Look, Statistics, Viewpoint, colours,
+    Log, Look, Statistics, Viewpoint, colours,
     number::{plus_minus, significant},
     picture::{self, BANDS},
     toast::Toasts,
@@ -288,12 +288,12 @@ impl Reference {
         all.figures()
     }
 
-    /// What to show, where there is a reference.
-    pub(crate) fn choice(&mut self, ui: &mut Ui, actions: &mut Actions) {
+    /// What to show, where there is a reference; whether it is to be let go.
+    pub(crate) fn choice(&mut self, ui: &mut Ui) -> bool {
         if !self.is_kept() {
-            return;
+            return false;
         }
-        ui.horizontal(|ui| {
+        let row = ui.horizontal(|ui| {
             let hint = tr!(
                 "The reference on the left of a line that is dragged, the picture on its right"
             );
@@ -310,10 +310,9 @@ impl Reference {
                 ui.selectable_value(&mut self.shown, shown, name).on_hover_text(hint);
             }
             ui.separator();
-            if ui.button(tr!("Let the reference go")).clicked() {
-                actions.ask(Action::LetReferenceGo);
-            }
+            ui.button(tr!("Let the reference go")).clicked()
         });
+        row.inner
     }
 
     /// Draws what was chosen over the picture.
@@ -415,14 +414,12 @@ fn told(ui: &mut Ui, found: &Figures) {
     }
 }
 
-/// The button that keeps the picture.
-pub(crate) fn button(ui: &mut Ui, may: bool, actions: &mut Actions) {
+/// Whether the button is pressed that keeps the picture.
+pub(crate) fn button(ui: &mut Ui, may: bool) -> bool {
     let hint =
         tr!("Keeps the picture as it is now, to hold later ones of the same camera against it");
     let button = ui.add_enabled(may, Button::new(tr!("Keep as reference")));
-    if button.on_hover_text(hint).clicked() {
-        actions.ask(Action::KeepReference);
-    }
+    button.on_hover_text(hint).clicked()
 }
 
 #[cfg(test)]

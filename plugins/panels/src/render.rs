@@ -46,7 +46,9 @@ pub(crate) fn render(
     let reference = reference.bypass_change_detection();
     let may_keep = render.is_some() && !viewpoint.is_preview();
     toolbar(ui, &mut look, &mut refine, &mut learning, may_keep, &mut actions);
-    reference.choice(ui, &mut actions);
+    if reference.choice(ui) {
+        actions.ask(Action::LetReferenceGo);
+    }
     status(ui, &look, refine.bypass_change_detection(), &viewpoint, &statistics, render.as_deref());
     let (Some(render), Some(lit)) = (render, lit) else {
         cursor.set_if_neq(Cursor(None));
@@ -248,7 +250,9 @@ fn toolbar(
             refine.target = target / 100.0;
         }
         ui.separator();
-        reference::button(ui, may_keep, actions);
+        if reference::button(ui, may_keep) {
+            actions.ask(Action::KeepReference);
+        }
     });
     ui.horizontal(|ui| {
         steering::choice(ui, learning);
