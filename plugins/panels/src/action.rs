@@ -11,7 +11,7 @@ use intrados_scene::{
 };
 
 use crate::{
-    Banners, Colours, Language, Log, Look, Quantity, Refine, Selection, Viewpoint, Workspace,
+    Banners, Colours, Jump, Language, Log, Look, Quantity, Refine, Selection, Viewpoint, Workspace,
     attach::Form,
     command::Palette,
     create::Creation,
@@ -22,9 +22,12 @@ use crate::{
     history::History,
     layout::Layout,
     photos::Photos,
+    play,
     recent::Recent,
+    reference::{self, Reference},
     saving::{Saving, Taken},
     structure::{self, Structure},
+    views::{self, Views},
     workspace::{self, Desk},
 };
 
@@ -59,14 +62,30 @@ pub enum Action {
     Home,
     /// Another camera of the scene, by its place in the list.
     Camera(usize),
+    /// Look from a view that is kept of the scene, by its place in the list.
+    View(usize),
+    /// Keep where the picture that is in sight looks from, by a name or the next number.
+    KeepView(String),
+    /// Keep it no longer.
+    ForgetView(usize),
+    /// Show or hide the list of views.
+    Views,
     /// Look at another side.
     Show(View),
     /// Light or its error.
     ShowQuantity(Quantity),
+    /// Keep the picture of light, to hold later ones against it.
+    KeepReference,
+    /// Keep it no longer.
+    LetReferenceGo,
     /// Select a member, or nothing.
     Select(Option<usize>),
     /// Select the next member of the list, or the one before.
     Step(bool),
+    /// Go to another equilibrium of the lives of the members.
+    Jump(Jump),
+    /// Go through them by itself, or stop.
+    Play,
     /// Bring a panel to the front, by its name; it is opened where it was closed.
     Tab(&'static str),
     /// Open a panel, or close it.
@@ -225,13 +244,24 @@ fn carry_out(world: &mut World, action: Action) {
                 world.resource_mut::<Viewpoint>().go(camera);
             }
         }
+        Action::View(index) => views::go(world, index),
+        Action::KeepView(name) => views::keep(world, &name),
+        Action::ForgetView(index) => views::forget(world, index),
+        Action::Views => {
+            let mut views = world.resource_mut::<Views>();
+            views.is_open = !views.is_open;
+        }
         Action::Frame => frame(world),
         Action::Show(view) => world.resource_mut::<Look>().view = view,
         Action::ShowQuantity(quantity) => world.resource_mut::<Look>().quantity = quantity,
+        Action::KeepReference => reference::keep(world),
+        Action::LetReferenceGo => *world.resource_mut::<Reference>() = Reference::default(),
         Action::Select(member) => {
             world.resource_mut::<Selection>().set_if_neq(Selection(member));
         }
         Action::Step(forward) => step(world, forward),
+        Action::Jump(to) => play::jump(world, to),
+        Action::Play => play::toggle(world),
         Action::Tab(name) => show_tab(world, name),
         Action::Panel(name, true) => show_tab(world, &name),
         Action::Panel(name, false) => world.resource_mut::<Desk>().close(&name),
@@ -368,6 +398,7 @@ fn dismiss(world: &mut World) {
     if world.resource_mut::<Saving>().dismiss()
         || std::mem::take(&mut world.resource_mut::<Form>().is_open)
         || std::mem::take(&mut world.resource_mut::<Creation>().is_open)
+        || std::mem::take(&mut world.resource_mut::<Views>().is_open)
         || std::mem::take(&mut world.resource_mut::<Layout>().keys)
         || world.resource_mut::<Banners>().dismiss()
     {

@@ -7,13 +7,14 @@ use intrados_light::View;
 use intrados_scene::plugin::CurrentScene;
 
 use crate::{
-    Action, Actions, Language, Look, Quantity, Workspace,
+    Action, Actions, Jump, Language, Look, Quantity, Workspace,
     lang::{self, term},
     layout::Layout,
     place::Panels,
     recent::Recent,
     saving::Taken,
     scale,
+    views::Views,
     workspace::Desk,
 };
 
@@ -115,6 +116,16 @@ fn fixed(look: &Look) -> Vec<Command> {
         command(tr!("lay panels out as at first"), "", None, Action::ResetLayout),
         command(tr!("next member"), "Page down", by(NONE, Key::PageDown), Action::Step(true)),
         command(tr!("previous member"), "Page up", by(NONE, Key::PageUp), Action::Step(false)),
+        command(tr!("play the lives of the members, or stop"), "P", by(NONE, Key::P), Action::Play),
+        command(tr!("next equilibrium"), ".", by(NONE, Key::Period), Action::Jump(Jump::Forward)),
+        command(tr!("equilibrium before"), ",", by(NONE, Key::Comma), Action::Jump(Jump::Back)),
+        command(
+            tr!("first equilibrium"),
+            "Ctrl+Home",
+            by(CTRL, Key::Home),
+            Action::Jump(Jump::First),
+        ),
+        command(tr!("last equilibrium"), "Ctrl+End", by(CTRL, Key::End), Action::Jump(Jump::Last)),
         command(
             tr!("fit the selected member, or everything, into the picture"),
             "F",
@@ -127,12 +138,16 @@ fn fixed(look: &Look) -> Vec<Command> {
             by(NONE, Key::Home),
             Action::Home,
         ),
+        command(tr!("keep this view"), "", None, Action::KeepView(String::new())),
+        command(tr!("list of views, to name and to forget them"), "", None, Action::Views),
         command(tr!("pause or continue"), "Space", by(NONE, Key::Space), Action::Pause),
         command(tr!("restart the picture"), "R", by(NONE, Key::R), Action::Restart),
         command(tr!("primal side"), "1", by(NONE, Key::Num1), Action::Show(View::Primal)),
         command(tr!("dual side"), "2", by(NONE, Key::Num2), Action::Show(View::Dual)),
         command(tr!("both sides combined"), "3", by(NONE, Key::Num3), Action::Show(View::Combined)),
         command(tr!("light or error"), "E", by(NONE, Key::E), Action::ShowQuantity(quantity)),
+        command(tr!("keep the picture as reference"), "", None, Action::KeepReference),
+        command(tr!("let the reference go"), "", None, Action::LetReferenceGo),
         command(tr!("go on with the prediction"), "", None, Action::Predict),
         command(tr!("compare with an earlier prediction"), "", None, Action::ChoosePrediction),
         command(tr!("reload the scene"), "", None, Action::Reload),
@@ -184,6 +199,10 @@ fn all(world: &World) -> Vec<Command> {
             let name = tr!("camera: {}", camera.name);
             all.push(command(name, "", None, Action::Camera(index)));
         }
+        let views = world.resource::<Views>().of(&scene.0.path);
+        for (index, view) in views.iter().enumerate() {
+            all.push(command(tr!("view: {}", view.name), "", None, Action::View(index)));
+        }
     }
     for path in world.resource::<Recent>().list() {
         let name = tr!("open {}", path.display());
@@ -209,7 +228,7 @@ pub(crate) fn keys(ui: &Ui, world: &mut World) {
     let has_focus = ui.ctx().memory(|m| m.focused().is_some());
     let commands = fixed(world.resource::<Look>());
     let acts_anywhere = |modifiers: Modifiers, key: Key| {
-        modifiers.command && !matches!(key, Key::Z | Key::Y)
+        modifiers.command && !matches!(key, Key::Z | Key::Y | Key::Home | Key::End)
             || matches!(key, Key::F1 | Key::F9 | Key::F11 | Key::F12)
     };
     let asked: Vec<Action> = ui.input_mut(|i| {

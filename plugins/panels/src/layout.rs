@@ -35,13 +35,15 @@ use crate::{
     photos::Photos,
     picture::Picture,
     place::Panels,
+    play,
     recent::Recent,
+    reference::Reference,
     report::Report,
     saving::{self, Saving},
     scale::{self, Ranges},
     session, start,
     stress::Stress,
-    toast,
+    toast, views,
     workspace::{self, Desk},
 };
 
@@ -158,6 +160,7 @@ pub fn is_busy(world: &mut World) -> bool {
         || world.resource::<Learning>().is_coming()
         || world.resource::<Fields>().is_busy()
         || world.resource::<Picture>().is_behind()
+        || world.resource::<Reference>().is_behind()
         || world.resource::<Dialogs>().is_open()
         || world.resource::<Outline>().is_busy()
         || world.resource::<Ct>().is_busy()
@@ -179,6 +182,7 @@ pub fn show(ui: &mut Ui, world: &mut World) {
     // Before the keys: while it is open, it takes them.
     command::palette(ui, world);
     command::keys(ui, world);
+    play::go_on(ui, world);
     let [start, sheet, form, saving, creation] = own(world);
     session::offer(ui, world);
     banner::show(ui, world);
@@ -264,7 +268,11 @@ fn status(ui: &mut Ui, world: &mut World) {
             && let Some(line) = world.resource::<Log>().lines().last()
             && !line.starts_with('⚠')
         {
-            ui.add(egui::Label::new(egui::RichText::new(line).weak()).truncate());
+            let line = egui::Label::new(egui::RichText::new(line).weak()).truncate();
+            let hint = tr!("All that was said is in the log; a click opens it");
+            if ui.add(line.sense(egui::Sense::click())).on_hover_text(hint).clicked() {
+                world.resource_mut::<Actions>().ask(Action::Tab("Log"));
+            }
         }
     });
 }
@@ -319,21 +327,15 @@ fn menu(ui: &mut Ui, world: &mut World) {
                     asked.push(action);
                 }
             }
-            let cameras = scene.as_ref().map(|s| s.cameras.len()).unwrap_or_default();
-            ui.menu_button(tr!("Cameras"), |ui| {
-                for (i, camera) in scene.iter().flat_map(|s| &s.cameras).enumerate() {
-                    if ui.button(&camera.name).clicked() {
-                        asked.push(Action::Camera(i));
-                    }
-                }
-                if cameras == 0 {
-                    ui.weak(tr!("The scene has none of its own."));
-                }
-            });
+            ui.menu_button(tr!("Views"), |ui| views::menu(ui, world, &mut asked));
             let mut look = *world.resource::<Look>();
             ui.checkbox(&mut look.outline, tr!("Outline the selected member"));
             world.resource_mut::<Look>().set_if_neq(look);
             ui.separator();
+            let log = ui.button(tr!("Log of this session"));
+            if log.on_hover_text(tr!("All that was said, read again")).clicked() {
+                asked.push(Action::Tab("Log"));
+            }
             arrangement(ui, world, &mut asked);
         });
         if ui.button(tr!("Commands")).on_hover_text("Ctrl+P").clicked() {
@@ -453,6 +455,7 @@ fn sheets(
             .anchor(egui::Align2::CENTER_CENTER, [0.0, 0.0])
     };
     command::sheet(ui, world);
+    views::sheet(ui, world);
     let mut open = world.resource::<Form>().is_open;
     if open {
         // It may be drawn aside, to see where on the member something is.

@@ -16,7 +16,7 @@ use crate::{Colours, Statistics, Viewpoint, scale};
 
 /// A large film is developed in so many bands of rows, one a frame: all of it at once would take
 /// half a frame.
-const BANDS: usize = 8;
+pub(crate) const BANDS: usize = 8;
 
 /// Relative standard errors at the ends of the colour map; it is logarithmic between them.
 pub(crate) const ERRORS: [f32; 2] = [1e-3, 1.0];
@@ -215,7 +215,7 @@ pub(crate) fn develop(
 
 /// The films that a view is made of, and their weights; `share`: of the primal one where there are
 /// both.
-fn parts(render: &Render, view: View, share: f64) -> Vec<(&Film, f32)> {
+pub(crate) fn parts(render: &Render, view: View, share: f64) -> Vec<(&Film, f32)> {
     let film = |side: Side| render.exposure(side).and_then(|e| e.film.as_ref());
     match (view, film(Side::Primal), film(Side::Dual)) {
         (View::Primal, Some(f), _)
@@ -244,7 +244,12 @@ pub(crate) fn value(
     blend(&parts(render, look.view, share), look.order, pixel)
 }
 
-fn blend(parts: &[(&Film, f32)], order: Option<usize>, pixel: usize) -> Option<(Vec3, Vec3)> {
+/// The same of parts that are known.
+pub(crate) fn blend(
+    parts: &[(&Film, f32)],
+    order: Option<usize>,
+    pixel: usize,
+) -> Option<(Vec3, Vec3)> {
     let mut sum = (Vec3::ZERO, Vec3::ZERO);
     for &(film, share) in parts {
         sum.0 += share * mean(film, order, pixel)?;

@@ -10,8 +10,9 @@ use crate::{
     Actions, AddPanel, Banners, Language, Latest, Log, Look, Place, Refine, Selection, Statistics,
     Viewpoint, action, attach, banner, command, convergence, create, ct, dialog, directions, drops,
     edits, export, fields, history, inspector, layout, log, members, meters, moment, outline,
-    photos, picture, place::Panels, prediction, recent, refine, render, report, saving, session,
-    sheet, statistics, steering, stress, structure, toast, viewpoint, workspace,
+    photos, picture, place::Panels, play, prediction, recent, reference, refine, render, report,
+    saving, session, sheet, statistics, steering, stress, structure, toast, viewpoint, views,
+    workspace,
 };
 
 /// Adds the window's state and the built-in panels. It opens no window: whoever has one calls
@@ -27,6 +28,8 @@ pub struct PanelsPlugin {
     /// Where it is kept what is open and saved nowhere, for the case that the program breaks off;
     /// `None`: nowhere.
     pub session: Option<PathBuf>,
+    /// Where views are kept by name; `None`: nowhere, they last as long as the window.
+    pub views: Option<PathBuf>,
     /// Whether the system's file dialogs may be opened.
     pub dialogs: bool,
     /// What the window speaks until its user chooses.
@@ -39,10 +42,11 @@ impl PanelsPlugin {
     #[must_use]
     pub fn desktop() -> Self {
         let file = |name| dirs::data_dir().map(|d| d.join("intrados").join(name));
-        let [recent, layout, session] = ["recent.json", "layout.json", "session.json"].map(file);
+        let [recent, layout] = ["recent.json", "layout.json"].map(file);
+        let [session, views] = ["session.json", "views.json"].map(file);
         let language = sys_locale::get_locale().map_or(Language::English, |tag| Language::of(&tag));
         let slice = Some(Duration::from_millis(8));
-        Self { slice, recent, layout, session, dialogs: true, language }
+        Self { slice, recent, layout, session, views, dialogs: true, language }
     }
 }
 
@@ -62,9 +66,11 @@ impl Plugin for PanelsPlugin {
             .init_resource::<history::History>()
             .init_resource::<moment::Moment>()
             .init_resource::<moment::Courses>()
+            .init_resource::<play::Play>()
             .init_resource::<Log>()
             .init_resource::<picture::Picture>()
             .init_resource::<picture::Cursor>()
+            .init_resource::<reference::Reference>()
             .init_resource::<outline::Outline>()
             .init_resource::<fields::Fields>()
             .init_resource::<directions::Directions>()
@@ -91,6 +97,7 @@ impl Plugin for PanelsPlugin {
             .insert_resource(Refine::new(self.slice))
             .insert_resource(session::Session::read(self.session.clone()))
             .insert_resource(recent::Recent::read(self.recent.clone()))
+            .insert_resource(views::Views::read(self.views.clone()))
             .add_systems(
                 Update,
                 (action::act, dialog::take, viewpoint::steer, refine::share_frame)
@@ -105,6 +112,7 @@ impl Plugin for PanelsPlugin {
                     (history::keep, moment::follow),
                     refine::keep_time,
                     picture::develop,
+                    reference::compare,
                     fields::paint,
                     statistics::observe,
                     outline::trace,

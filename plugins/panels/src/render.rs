@@ -18,6 +18,7 @@ use crate::{
     orbit,
     outline::Outline,
     picture::{self, Cursor, Picture, Under},
+    reference::{self, Reference},
     scale::{self, Ranges},
     steering,
 };
@@ -33,6 +34,7 @@ pub(crate) fn render(
     mut refine: ResMut<Refine>,
     mut viewpoint: ResMut<Viewpoint>,
     mut picture: ResMut<Picture>,
+    mut reference: ResMut<Reference>,
     mut outline: ResMut<Outline>,
     mut learning: ResMut<Learning>,
     mut fields: ResMut<Fields>,
@@ -42,14 +44,26 @@ pub(crate) fn render(
     statistics: Res<Statistics>,
     mut actions: ResMut<Actions>,
 ) {
-    toolbar(ui, &mut look, &mut refine, &mut learning, &fields, &mut ranges, &mut actions);
+    let reference = reference.bypass_change_detection();
+    let may_keep = render.is_some() && !viewpoint.is_preview();
+    let mut new = *look;
+    toolbar(ui, &mut new, &mut refine, may_keep, &mut actions);
+    steered(ui, &mut new, &mut learning, &fields, &mut ranges);
+    look.set_if_neq(new);
+    if reference.choice(ui) {
+        actions.ask(Action::LetReferenceGo);
+    }
     status(ui, &look, refine.bypass_change_detection(), &viewpoint, &statistics, render.as_deref());
     let (Some(render), Some(lit)) = (render, lit) else {
         cursor.set_if_neq(Cursor(None));
         ui.centered_and_justified(|ui| ui.spinner());
         return;
     };
-    let legend = if look.quantity == Quantity::Radiance { 0.0 } else { 44.0 };
+    let legend = match look.quantity {
+        Quantity::Radiance if reference.is_kept() => reference::FIGURES,
+        Quantity::Radiance => 0.0,
+        Quantity::Error | Quantity::Field(_) => 44.0,
+    };
     let area = ui.available_rect_before_wrap();
     let camera = viewpoint.camera().unwrap_or(render.camera()).clone();
     let rect = fit(
@@ -71,10 +85,16 @@ pub(crate) fn render(
     } else if let Some(texture) = picture.bypass_change_detection().texture(ui.ctx()) {
         ui.painter().image(texture.id(), rect, whole, Color32::WHITE);
     }
+    if look.quantity == Quantity::Radiance {
+        reference.draw(ui, rect, look.exposure);
+    }
     if let Some(texture) = outline.bypass_change_detection().texture(ui.ctx()) {
         ui.painter().image(texture.id(), rect, whole, Color32::WHITE);
     }
     hand(ui, &response, rect, &mut viewpoint);
+    if look.quantity == Quantity::Radiance {
+        reference.divider(ui, rect);
+    }
     let under = response.hover_pos().map(|at| under(&lit, render.camera(), rect, at));
     cursor.set_if_neq(Cursor(under));
     if response.clicked() {
@@ -94,7 +114,7 @@ pub(crate) fn render(
         pos2(rect.right(), rect.bottom() + 42.0),
     );
     match look.quantity {
-        Quantity::Radiance => {}
+        Quantity::Radiance => reference.figures(ui, below),
         Quantity::Error => {
             let caption = tr!("relative standard error of a pixel (logarithmic)");
             let share = |error: f32| local(format!("{} %", 100.0 * error));
@@ -182,14 +202,11 @@ fn hand(ui: &Ui, response: &egui::Response, rect: Rect, viewpoint: &mut ResMut<V
 
 fn toolbar(
     ui: &mut Ui,
-    look: &mut ResMut<Look>,
+    look: &mut Look,
     refine: &mut ResMut<Refine>,
-    learning: &mut ResMut<Learning>,
-    fields: &Fields,
-    ranges: &mut Ranges,
+    may_keep: bool,
     actions: &mut Actions,
 ) {
-    let mut new = **look;
     ui.horizontal(|ui| {
         let pause = if refine.paused { tr!("▶ Continue") } else { tr!("⏸ Pause") };
         if ui.button(pause).on_hover_text("Space").clicked() {
@@ -205,18 +222,18 @@ fn toolbar(
             (View::Primal, tr!("Primal"), tr!("Walks from the camera to the lamps (1)")),
             (View::Dual, tr!("Dual"), tr!("Walks from the lamps to the camera (2)")),
         ] {
-            ui.selectable_value(&mut new.view, view, name).on_hover_text(hint);
+            ui.selectable_value(&mut look.view, view, name).on_hover_text(hint);
         }
         ui.separator();
-        bounces(ui, &mut new);
+        bounces(ui, look);
         ui.separator();
-        ui.selectable_value(&mut new.quantity, Quantity::Radiance, tr!("Light"));
-        ui.selectable_value(&mut new.quantity, Quantity::Error, tr!("Error"))
+        ui.selectable_value(&mut look.quantity, Quantity::Radiance, tr!("Light"));
+        ui.selectable_value(&mut look.quantity, Quantity::Error, tr!("Error"))
             .on_hover_text(tr!("Relative standard error of every pixel (E)"));
     });
     ui.horizontal(|ui| {
         let label = ui.label(tr!("Exposure|photo"));
-        let slider = slide(&mut new.exposure, -10.0..=10.0).suffix(" EV").fixed_decimals(1);
+        let slider = slide(&mut look.exposure, -10.0..=10.0).suffix(" EV").fixed_decimals(1);
         ui.add(slider)
             .labelled_by(label.id)
             .on_hover_text(tr!("Develops the picture anew, and does not restart it"));
@@ -229,12 +246,26 @@ fn toolbar(
         if ui.add(field.suffix(" %")).labelled_by(label.id).changed() {
             refine.target = target / 100.0;
         }
+        ui.separator();
+        if reference::button(ui, may_keep) {
+            actions.ask(Action::KeepReference);
+        }
     });
+}
+
+/// What walks are steered by, and how it is looked at.
+fn steered(
+    ui: &mut Ui,
+    look: &mut Look,
+    learning: &mut ResMut<Learning>,
+    fields: &Fields,
+    ranges: &mut Ranges,
+) {
     ui.horizontal(|ui| {
         steering::choice(ui, learning);
         ui.separator();
-        field_choice(ui, &mut new);
-        if let Quantity::Field(side) = new.quantity
+        field_choice(ui, look);
+        if let Quantity::Field(side) = look.quantity
             && let Some(painted) = fields.painted(side)
         {
             let (seen, unit) = (painted.scale.range, fields::meaning(side)[1]);
@@ -242,7 +273,6 @@ fn toolbar(
         }
         ui.weak(steering::state(learning));
     });
-    look.set_if_neq(new);
 }
 
 /// Which field to look at.

@@ -268,6 +268,7 @@ pub(crate) fn picture(ui: &Ui, world: &mut World) {
             None => {
                 ui.ctx().copy_image(part);
                 world.resource_mut::<Toasts>().say(tr!("The picture is on the clipboard"));
+                world.resource_mut::<Log>().say(tr!("copied a picture"));
             }
         }
     }

@@ -5,7 +5,9 @@ use bevy_ecs::world::World;
 use egui::Ui;
 use intrados_stage::{Fault, catch};
 
-use crate::{Action, Actions, Banners, Log, banner, layout, recent::Recent, session::Session};
+use crate::{
+    Action, Actions, Banners, Log, banner, layout, recent::Recent, session::Session, views::Views,
+};
 
 /// An app with panels that outlives a panic in any of its systems.
 ///
@@ -75,6 +77,7 @@ impl Window {
         *to.resource_mut::<Log>() = std::mem::take(&mut *from.resource_mut::<Log>());
         *to.resource_mut::<Recent>() = std::mem::take(&mut *from.resource_mut::<Recent>());
         *to.resource_mut::<Session>() = std::mem::take(&mut *from.resource_mut::<Session>());
+        *to.resource_mut::<Views>() = std::mem::take(&mut *from.resource_mut::<Views>());
         let asked = from.resource_mut::<layout::Layout>().asked.take();
         to.resource_mut::<layout::Layout>().asked = asked;
         // What broke may break once more while it goes.

@@ -2,13 +2,15 @@
 
 use std::{fs, path::Path};
 
+use bevy_ecs::world::World;
+use egui::{Key, Modifiers};
 use egui_kittest::kittest::{NodeT, Queryable};
 use intrados_forecast::ForecastSettings;
 use intrados_light::Render;
 use intrados_mechanics::plugin::{Analyses, ShownAt};
-use intrados_panels::{Action, Latest, PanelsPlugin, Selection, Viewpoint};
+use intrados_panels::{Action, Latest, Log, PanelsPlugin, Selection, Viewpoint};
 use intrados_predict::{PredictSettings, Predicting};
-use intrados_scene::plugin::CurrentScene;
+use intrados_scene::{Camera, plugin::CurrentScene};
 use intrados_stage::Work;
 
 use super::{LONELY, Window, press, rest, type_into, with_column, with_lonely};
@@ -141,10 +143,8 @@ fn keeping(file: &Path) -> Window {
     Window::of(app)
 }
 
-/// The slider goes through the lives of the members: as they were, as they are known now, as they
-/// are forecast; all that shows members follows it.
-#[test]
-fn the_slider_goes_through_the_lives_of_members() {
+/// A column whose life is known and forecast.
+fn with_life() -> (Window, tempfile::TempDir) {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("column.ron");
     fs::write(&file, intrados_scene::parametric::template("column").expect("a template"))
@@ -159,6 +159,14 @@ fn the_slider_goes_through_the_lives_of_members() {
         w.get_resource::<Latest>().is_some_and(|l| l.result.is_some())
     });
     window.frames(3);
+    (window, folder)
+}
+
+/// The slider goes through the lives of the members: as they were, as they are known now, as they
+/// are forecast; all that shows members follows it.
+#[test]
+fn the_slider_goes_through_the_lives_of_members() {
+    let (mut window, _folder) = with_life();
     let shown = |window: &Window| window.with(|w| *w.resource::<ShownAt>());
     assert_eq!(shown(&window), ShownAt(None));
     let now = window.picture();
@@ -180,6 +188,148 @@ fn the_slider_goes_through_the_lives_of_members() {
     window.ask(Action::Select(Some(0)));
     window.frames(3);
     assert!(has(&window, "d of the worst zone by its life"), "the sheet has no course");
+}
+
+/// Keys go from one equilibrium to the next; playing shows the same ones by itself, and stops at the
+/// last.
+#[test]
+fn playing_shows_all_equilibria_and_stops_at_the_last() {
+    let (mut window, _folder) = with_life();
+    let shown = |window: &Window| window.with(|w| *w.resource::<ShownAt>());
+    let to_first = |window: &mut Window| {
+        window.harness.key_press_modifiers(Modifiers::COMMAND, Key::Home);
+        window.frames(2);
+        shown(window)
+    };
+    let mut stepped = vec![to_first(&mut window)];
+    loop {
+        window.harness.key_press(Key::Period);
+        window.frames(2);
+        if stepped.last() == Some(&shown(&window)) {
+            break;
+        }
+        stepped.push(shown(&window));
+    }
+    assert!(stepped.len() > 3, "{stepped:?}");
+    window.harness.key_press(Key::Comma);
+    window.frames(2);
+    assert_eq!(Some(&shown(&window)), stepped.iter().rev().nth(1));
+    let mut played = vec![to_first(&mut window)];
+    window.click("▶ Play");
+    assert!(has(&window, "⏸ Pause"));
+    while has(&window, "⏸ Pause") {
+        window.frame();
+        if played.last() != Some(&shown(&window)) {
+            played.push(shown(&window));
+        }
+    }
+    assert_eq!(played, stepped);
+    window.harness.key_press(Key::P);
+    window.frames(2);
+    assert_eq!(shown(&window), stepped[0], "from the last it begins anew");
+    window.harness.key_press(Key::P);
+    window.frames(2);
+    assert!(!has(&window, "⏸ Pause"), "the same key stops it");
+}
+
+/// A view that was kept by its name is gone to from elsewhere, by the palette, and forgotten.
+#[test]
+fn a_kept_view_is_gone_to_and_forgotten() {
+    let mut window = Window::with_scene("cornell");
+    let camera = |window: &Window| {
+        window.with(|w| w.resource::<Viewpoint>().camera().cloned()).expect("a camera")
+    };
+    let home = camera(&window);
+    let there = Camera { position: home.position + 0.2 * home.up, ..home.clone() };
+    window.with(|w| w.resource_mut::<Viewpoint>().go(there.clone()));
+    window.ask(Action::Views);
+    window.frames(3);
+    type_into(&mut window, "Name of the view", "the lamp");
+    window.click("Keep this view");
+    assert!(window.harness.query_by_label("the lamp").is_some(), "it is not listed");
+    window.ask(Action::Dismiss);
+    window.ask(Action::Home);
+    window.frames(2);
+    assert!(window.harness.query_by_label("Name of the view").is_none(), "it is put away");
+    assert_eq!(camera(&window), home);
+    window.ask(Action::Palette);
+    window.frames(3);
+    window.harness.get_by_label("Command").type_text("view lamp");
+    window.frames(2);
+    window.harness.key_press(Key::Enter);
+    window.frames(3);
+    assert_eq!(camera(&window), there);
+    window.ask(Action::Views);
+    window.frames(3);
+    window.click("Forget the view the lamp");
+    assert!(window.harness.query_by_label("the lamp").is_none(), "it is still listed");
+}
+
+/// A reference is held against the picture: by its figures, and under a divider that is dragged
+/// instead of the camera; with the camera it goes.
+#[test]
+fn a_picture_is_held_against_its_reference() {
+    let mut window = Window::with_scene("cornell");
+    window.click("Primal");
+    window.until("some light", |w| w.resource::<Render>().samples_per_pixel() > 4.0);
+    window.click("⏸ Pause");
+    window.click("Keep as reference");
+    window.frames(20);
+    assert!(window.harness.query_by_label("relMSE 0").is_some(), "it is its own reference");
+    window.click("Dual");
+    window.frames(20);
+    assert!(has(&window, "relMSE ") && window.harness.query_by_label("relMSE 0").is_none());
+    let rect = window.harness.get_by_label("Picture").rect();
+    let seen = |window: &mut Window, shown: &str| {
+        window.click(shown);
+        window.frames(3);
+        columns(&window.picture(), rect)
+    };
+    let [own, reference] = ["This picture", "Reference"].map(|shown| seen(&mut window, shown));
+    let difference = seen(&mut window, "Difference");
+    let wiped = seen(&mut window, "Wipe");
+    assert!(own != reference && difference != own && difference != reference);
+    let count = own.len();
+    let (middle, aside) = (count / 2, 8);
+    assert_eq!(wiped[..middle - aside], reference[..middle - aside]);
+    assert_eq!(wiped[middle + aside..], own[middle + aside..]);
+    let camera = window.with(|w| w.resource::<Viewpoint>().camera().cloned());
+    drag(&mut window, rect, [0.5, 0.25]);
+    let wiped = columns(&window.picture(), rect);
+    assert_eq!(wiped[count / 4 + aside..], own[count / 4 + aside..], "the divider stays");
+    assert_eq!(wiped[..count / 4 - aside], reference[..count / 4 - aside]);
+    assert_eq!(window.with(|w| w.resource::<Viewpoint>().camera().cloned()), camera);
+    window.with(|w| {
+        let there = camera.clone().map(|c| Camera { fov_deg: 0.9 * c.fov_deg, ..c });
+        w.resource_mut::<Viewpoint>().go(there.expect("a camera"));
+    });
+    window.frames(3);
+    assert!(window.harness.query_by_label("Wipe").is_none(), "it is kept for another camera");
+    let said = |w: &mut World| w.resource::<Log>().lines().iter().any(|l| l.contains("is let go"));
+    assert!(window.with(said));
+}
+
+/// Columns of what is seen there.
+fn columns(picture: &image::RgbImage, rect: egui::Rect) -> Vec<Vec<[u8; 3]>> {
+    let range = |from: f32, to: f32| from.ceil() as u32 + 1..to.floor() as u32 - 1;
+    let rows = range(rect.top(), rect.bottom());
+    let column = |x: u32| rows.clone().map(|y| picture.get_pixel(x, y).0).collect();
+    range(rect.left(), rect.right()).map(column).collect()
+}
+
+/// Drags from one share of the width to another, at half the height.
+fn drag(window: &mut Window, rect: egui::Rect, [from, to]: [f32; 2]) {
+    let at = |x: f32| rect.lerp_inside(egui::vec2(x, 0.5));
+    window.harness.hover_at(at(from));
+    window.frames(2);
+    window.harness.drag_at(at(from));
+    window.frames(2);
+    for k in 1..=4 {
+        window.harness.hover_at(at(from + (to - from) * k as f32 / 4.0));
+        window.frame();
+    }
+    window.harness.drop_at(at(to));
+    window.frames(3);
 }
 
 /// As it looks: the path-traced picture comes from where the structure is looked at, and goes again.

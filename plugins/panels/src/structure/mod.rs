@@ -13,7 +13,7 @@ use std::sync::Arc;
 use bevy_ecs::prelude::*;
 use egui::{Rect, Ui, vec2};
 use glam::Vec3;
-use intrados_scene::{Scene, plugin::CurrentScene};
+use intrados_scene::{Camera, Scene, plugin::CurrentScene};
 use intrados_stage::Jobs;
 use measure::Tape;
 use model::Scale;
@@ -27,6 +27,7 @@ use crate::{
     history::{Earlier, History},
     lang::fixed,
     moment::{Courses, Moment, Seen, Timeline},
+    play::Play,
 };
 
 /// Where the structure is looked at from.
@@ -89,6 +90,17 @@ impl Structure {
         self.wished = Some(view);
     }
 
+    /// Where it is looked at from, once it was shown.
+    pub(crate) fn camera(&self) -> Option<&Camera> {
+        self.model.camera()
+    }
+
+    /// Looks from there.
+    pub(crate) fn follow(&mut self, camera: &Camera) {
+        self.model.follow(camera);
+        self.earlier.follow(camera);
+    }
+
     /// Where the evidence is that a form asks for.
     fn put(&mut self, scene: &Scene, under: Option<Spot>, form: &mut Form) {
         let spot = under.filter(|_| form.is_open);
@@ -129,6 +141,7 @@ pub(crate) fn structure(
     mut structure: ResMut<Structure>,
     courses: Res<Courses>,
     mut moment: ResMut<Moment>,
+    play: Res<Play>,
     mut light: Light<'_>,
     mut form: ResMut<Form>,
     mut jobs: ResMut<Jobs>,
@@ -198,7 +211,8 @@ pub(crate) fn structure(
     ui.scope_builder(egui::UiBuilder::new().max_rect(bar), |ui| {
         ui.vertical(|ui| {
             let timeline = &courses.timeline;
-            tools(ui, structure, history, *selection, (&mut moment, timeline), &mut actions);
+            let time = (&mut moment, timeline, play.is_on);
+            tools(ui, structure, history, *selection, time, &mut actions);
         });
     });
 }
@@ -298,7 +312,7 @@ fn tools(
     structure: &mut Structure,
     history: &mut History,
     selection: Selection,
-    (moment, timeline): (&mut ResMut<Moment>, &Timeline),
+    (moment, timeline, is_playing): (&mut ResMut<Moment>, &Timeline, bool),
     actions: &mut Actions,
 ) {
     let frame = egui::Frame::popup(ui.style()).inner_margin(4);
@@ -327,7 +341,9 @@ fn tools(
     });
     if timeline.range().is_some() {
         let mut when = **moment;
-        frame.show(ui, |ui| ui.horizontal(|ui| time::bar(ui, &mut when, timeline)));
+        frame.show(ui, |ui| {
+            ui.horizontal(|ui| time::bar(ui, &mut when, timeline, is_playing, actions))
+        });
         moment.set_if_neq(when);
     }
     let bounds = structure.model.bounds();

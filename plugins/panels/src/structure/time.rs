@@ -5,6 +5,7 @@ use egui::{Button, Response, Shape, Slider, Stroke, Ui, pos2};
 use intrados_stage::time::{DAY, YEAR};
 
 use crate::{
+    Action, Actions, Jump,
     lang::fixed,
     moment::{Moment, Timeline},
 };
@@ -15,13 +16,23 @@ const WIDTH: f32 = 240.0;
 const MARK: f32 = 3.0;
 
 /// When it is looked at. Only equilibria are offered: there is nothing between.
-pub(super) fn bar(ui: &mut Ui, moment: &mut Moment, timeline: &Timeline) {
+pub(super) fn bar(
+    ui: &mut Ui,
+    moment: &mut Moment,
+    timeline: &Timeline,
+    is_playing: bool,
+    actions: &mut Actions,
+) {
     let Some([first, last]) = timeline.range() else { return };
     let hint = tr!("Damage as it is known now");
-    if ui.selectable_label(moment.is_now(), tr!("Now")).on_hover_text(hint).clicked() {
+    let is_now = ui.selectable_label(moment.is_now(), tr!("Now")).on_hover_text(hint).clicked();
+    if is_now {
         *moment = Moment::default();
     }
-    step(ui, "◀", &tr!("The equilibrium before"), timeline.beyond(moment.years, false), moment);
+    let may = |to| timeline.after(to, moment.years).is_some();
+    let [is_after, is_before] = [may(Jump::Back), may(Jump::Forward)];
+    jump(ui, "⏮", tr!("The first equilibrium (Ctrl+Home)"), (Jump::First, is_after), actions);
+    jump(ui, "◀", tr!("The equilibrium before (,)"), (Jump::Back, is_after), actions);
     ui.spacing_mut().slider_width = WIDTH;
     let mut years = moment.years;
     let slider = ui.add(Slider::new(&mut years, first..=last).show_value(false));
@@ -30,10 +41,19 @@ pub(super) fn bar(ui: &mut Ui, moment: &mut Moment, timeline: &Timeline) {
         moment.years = timeline.nearest(years, moment.years);
     }
     marks(ui, &slider, [first, last], timeline);
+    let is_held = is_now || slider.changed();
     slider.on_hover_text(tr!(
         "Equilibria of the members' lives. Below: pours; above: days on which something was seen or read; the line: now."
     ));
-    step(ui, "▶", &tr!("The next equilibrium"), timeline.beyond(moment.years, true), moment);
+    jump(ui, "▶", tr!("The next equilibrium (.)"), (Jump::Forward, is_before), actions);
+    jump(ui, "⏭", tr!("The last equilibrium (Ctrl+End)"), (Jump::Last, is_before), actions);
+    let name = if is_playing { tr!("⏸ Pause") } else { tr!("▶ Play") };
+    let play =
+        ui.button(name).on_hover_text(tr!("All equilibria from here, one after another (P)"));
+    // Whoever takes the slider wants to stay where it is put.
+    if play.clicked() || is_held && is_playing {
+        actions.ask(Action::Play);
+    }
     ui.strong(told(moment.years, timeline));
     if moment.years > 0.0 && !moment.is_now() {
         let hint = tr!(
@@ -43,10 +63,17 @@ pub(super) fn bar(ui: &mut Ui, moment: &mut Moment, timeline: &Timeline) {
     }
 }
 
-fn step(ui: &mut Ui, sign: &str, hint: &str, to: Option<f64>, moment: &mut Moment) {
-    let button = ui.add_enabled(to.is_some(), Button::new(sign).small()).on_hover_text(hint);
-    if let Some(to) = to.filter(|_| button.clicked()) {
-        moment.years = to;
+/// A button to another equilibrium; whether there is one.
+fn jump(
+    ui: &mut Ui,
+    sign: &str,
+    hint: String,
+    (to, is_there): (Jump, bool),
+    actions: &mut Actions,
+) {
+    let button = ui.add_enabled(is_there, Button::new(sign).small()).on_hover_text(hint);
+    if button.clicked() {
+        actions.ask(Action::Jump(to));
     }
 }
 
