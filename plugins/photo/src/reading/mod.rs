@@ -22,7 +22,7 @@ use crate::{
 };
 use course::{Line, lines};
 use returned::{Opened, USUAL, returned};
-use width::{FOUND, Piece, SHOWS, blur, pieces, scatter};
+use width::{FOUND, Piece, SHOWS, Slots, pieces, scatter};
 
 pub use defect::{Crack, CrackPoint, Defect, Patch};
 
@@ -146,10 +146,10 @@ pub fn read(
     let value = light.map(|c| c.element_sum() / 3.0);
     let marks = marks(&light, &known, job)?;
     let lines = lines(&marks.cracks());
-    let blur = blur(&value, &lines);
-    let scatter = scatter(&value, &lines, blur);
+    let slots = Slots::of(&value, &lines);
+    let scatter = scatter(&value, &lines, &slots);
     let face = Face { site, seen, map, surface: site.surface(seen.member) };
-    let shown = shown(&value, lines, blur, scatter);
+    let shown = shown(&value, lines, &slots, scatter);
     let mut defects = face.cracks(&shown, scatter, under, job)?;
     net(&mut defects);
     defects.extend(face.patches(&marks));
@@ -162,11 +162,11 @@ pub fn read(
 fn shown(
     value: &Grid<f32>,
     lines: Vec<Line>,
-    blur: f64,
+    slots: &Slots,
     scatter: Option<f64>,
 ) -> Vec<(Line, Vec<Piece>)> {
     let measured = |line: Line| {
-        let pieces = pieces(value, &line, blur);
+        let pieces = pieces(value, &line, slots);
         (line, pieces)
     };
     let shows = |(_, pieces): &(Line, Vec<Piece>)| {

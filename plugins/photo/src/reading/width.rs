@@ -21,9 +21,15 @@ const STEP: f64 = 0.5;
 /// Steps of missing light that are tried, pixels, and the least: texture may also be bright.
 const TRY: f64 = 0.1;
 const LEAST: f64 = -2.0;
-/// Blurs that are tried, pixels (deviation of a Gaussian), and the one of most sharp pictures.
-const BLURS: [f64; 12] = [0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.15, 1.35, 1.6, 1.9, 2.3, 2.8];
-pub(super) const SHARP: f64 = 0.85;
+/// Blurs that are tried, pixels (deviation of a Gaussian): the first, by how much each is more than
+/// the one before, and how many. Then the one of most sharp pictures.
+const BLURS: (f64, f64, i32) = (0.2, 1.09, 31);
+pub(super) const SHARP: f64 = 0.6;
+/// A pixel and the reading between pixels spread light, too, with a variance of 1/12 + 1/6: as these
+/// three points do, a share of .25, .5 and .25 at so many pixels before, on and after.
+const SPREAD: f64 = std::f64::consts::FRAC_1_SQRT_2;
+/// Widest half of a mouth, pixels: of what is wider the rest is not looked at.
+const WIDEST: usize = 24;
 /// Pieces that tell the blur: at least, and at most as many as it takes.
 const TELL: [usize; 2] = [4, 80];
 /// Places without cracks that are tried for the scatter of a face.
@@ -45,35 +51,30 @@ pub(super) struct Piece {
     pub(super) missing: f64,
 }
 
-/// Pieces of a line whose two sides are seen, in a picture of this blur.
-pub(super) fn pieces(value: &Grid<f32>, line: &Line, blur: f64) -> Vec<Piece> {
-    let piece =
-        |(points, cut): ([usize; 2], Cut)| Some(Piece { points, missing: cut.slot(blur)?.missing });
+/// Pieces of a line whose two sides are seen.
+pub(super) fn pieces(value: &Grid<f32>, line: &Line, slots: &Slots) -> Vec<Piece> {
+    let piece = |(points, cuts): ([usize; 2], Cuts)| {
+        Some(Piece { points, missing: midmean(cuts.slots(slots).map(|s| s.missing).collect())? })
+    };
     cuts(value, line).filter_map(piece).collect()
 }
 
-/// The blur of a picture, pixels, by the shape of its cracks: the one with which the slots leave
-/// least of the cuts unexplained, each by its own scatter.
-pub(super) fn blur(value: &Grid<f32>, lines: &[Line]) -> f64 {
-    let all: Vec<Cut> = lines.iter().flat_map(|line| cuts(value, line)).map(|c| c.1).collect();
-    if all.len() < TELL[0] {
-        return SHARP;
-    }
-    let some = || all.iter().step_by(all.len().div_ceil(TELL[1]));
-    let left = |blur: f64| -> f64 {
-        some().filter_map(|cut| cut.slot(blur)).map(|slot| slot.left.max(1e-12).ln()).sum()
-    };
-    BLURS.into_iter().min_by(|a, b| left(*a).total_cmp(&left(*b))).unwrap_or(SHARP)
+/// The mean of the middle third: a pore on the line or a stone beside it is in some of the cuts and
+/// would else count by its area.
+fn midmean(mut cuts: Vec<f64>) -> Option<f64> {
+    cuts.sort_by(f64::total_cmp);
+    let middle = &cuts[cuts.len() / 3..cuts.len() - cuts.len() / 3];
+    (!middle.is_empty()).then(|| middle.iter().sum::<f64>() / middle.len() as f64)
 }
 
 /// Cuts across a line's pieces, with the first and last point of each.
-fn cuts(value: &Grid<f32>, line: &Line) -> impl Iterator<Item = ([usize; 2], Cut)> {
+fn cuts(value: &Grid<f32>, line: &Line) -> impl Iterator<Item = ([usize; 2], Cuts)> {
     let last = line.points.len().saturating_sub(1);
     (0..last).step_by(PIECE).filter_map(move |first| {
         let end = (first + PIECE - 1).min(last);
         let half = line.half[first..=end].iter().copied().fold(1.0, f64::max);
         let places = (first..=end).filter_map(|k| Some((line.points[k], across(line, k)?)));
-        Some(([first, end], Cut::of(value, places, half)?))
+        Some(([first, end], Cuts::of(value, places, half)?))
     })
 }
 
@@ -85,86 +86,129 @@ fn across(line: &Line, k: usize) -> Option<[f64; 2]> {
     (length > 0.0).then(|| [-e / length, d / length])
 }
 
-/// Light across a piece of a line.
-struct Cut {
-    /// Pixels from the line, and the light there.
-    light: Vec<[f64; 2]>,
-    /// Most that may be missing, pixels.
-    most: f64,
+/// Light on cuts across a piece of a line.
+struct Cuts {
+    /// Of a cut its light, every [`STEP`] across.
+    light: Vec<Vec<f64>>,
+    /// Half the mouth at most, whole pixels.
+    half: usize,
+}
+
+impl Cuts {
+    /// Of places and directions across, if at least half of the cuts are seen.
+    fn of(
+        value: &Grid<f32>,
+        places: impl Iterator<Item = ([f64; 2], [f64; 2])>,
+        half: f64,
+    ) -> Option<Self> {
+        let half = (half.ceil() as usize).min(WIDEST);
+        let (mut light, mut count) = (Vec::new(), 0);
+        for (at, across) in places {
+            count += 1;
+            let on = |s: f64| sampled(value, [at[0] + s * across[0], at[1] + s * across[1]]);
+            light.extend(steps(half).map(on).collect::<Option<Vec<f64>>>());
+        }
+        (2 * light.len() > count).then_some(Self { light, half })
+    }
+
+    fn slots(&self, slots: &Slots) -> impl Iterator<Item = Slot> {
+        self.light.iter().filter_map(move |cut| slots.best(cut, self.half))
+    }
+}
+
+/// Pixels across at which a cut is read.
+fn steps(half: usize) -> impl Iterator<Item = f64> {
+    let steps = ((half as f64 + BESIDE) / STEP) as i32;
+    (-steps..=steps).map(|k| f64::from(k) * STEP)
+}
+
+/// Slots in a picture of some blur: of each, from one that adds light to the widest, the share of
+/// the light that it lets by, by place across.
+pub(super) struct Slots(Vec<Vec<f64>>);
+
+impl Slots {
+    /// For mouths of at most so many pixels to either side.
+    pub(super) fn new(blur: f64, half: usize) -> Self {
+        let by = |k| steps(half).map(|s| 1.0 - taken(s, missing(k), blur)).collect();
+        Self((0..=tries(half)).map(by).collect())
+    }
+
+    /// Those of a picture whose blur the shape of its cracks tells: the blur with which slots leave
+    /// least of the cuts unexplained, each by its own scatter.
+    pub(super) fn of(value: &Grid<f32>, lines: &[Line]) -> Self {
+        let all: Vec<Cuts> = lines.iter().flat_map(|line| cuts(value, line)).map(|c| c.1).collect();
+        let half = all.iter().map(|cuts| cuts.half).fold(1, usize::max);
+        if all.len() < TELL[0] {
+            return Self::new(SHARP, half);
+        }
+        let left = |slots: &Self| -> f64 {
+            let some = all.iter().step_by(all.len().div_ceil(TELL[1]));
+            some.flat_map(|cuts| cuts.slots(slots)).map(|slot| slot.left.max(1e-12).ln()).sum()
+        };
+        let (first, more, count) = BLURS;
+        let tried = (0..count).map(|k| {
+            let slots = Self::new(first * more.powi(k), half);
+            (left(&slots), slots)
+        });
+        let best = tried.min_by(|a, b| a.0.total_cmp(&b.0));
+        best.map_or_else(|| Self::new(SHARP, half), |(_, slots)| slots)
+    }
+
+    /// The slot that explains a cut best, across a mouth of so many pixels to either side.
+    fn best(&self, cut: &[f64], half: usize) -> Option<Slot> {
+        let last = tries(half).min(self.0.len().saturating_sub(1));
+        let left: Vec<f64> = self.0[..=last].iter().map(|q| unexplained(q, cut)).collect();
+        let k = (1..last).min_by(|a, b| left[*a].total_cmp(&left[*b]))?;
+        // The lowest point of the parabola through three tries.
+        let bend = left[k - 1] - 2.0 * left[k] + left[k + 1];
+        let beside = if bend > 0.0 { 0.5 * (left[k - 1] - left[k + 1]) / bend } else { 0.0 };
+        let level = cut.iter().sum::<f64>() / cut.len() as f64;
+        let left = left[k] / (level * level);
+        (level > 0.0).then(|| Slot { missing: missing(k) + beside.clamp(-1.0, 1.0) * TRY, left })
+    }
 }
 
 /// What explains a cut.
 struct Slot {
     /// Pixels of light.
     missing: f64,
-    /// Sum of what is left of the cut, squared, over the square of the light beside.
+    /// What it leaves of the cut, squared, over the square of the light beside.
     left: f64,
 }
 
-impl Cut {
-    /// The middle of many cuts, where at least half of them are seen: by place the mean of their
-    /// middle half, since a pore on the line or a stone beside it is in some of them.
-    fn of(
-        value: &Grid<f32>,
-        places: impl Iterator<Item = ([f64; 2], [f64; 2])>,
-        half: f64,
-    ) -> Option<Self> {
-        let steps = ((half + BESIDE) / STEP) as i32;
-        let along = || (-steps..=steps).map(|k| f64::from(k) * STEP);
-        let (mut rows, mut count) = (Vec::<Vec<f64>>::new(), 0);
-        for (at, across) in places {
-            count += 1;
-            let on = |s: f64| sampled(value, [at[0] + s * across[0], at[1] + s * across[1]]);
-            rows.extend(along().map(on).collect::<Option<_>>());
-        }
-        if 2 * rows.len() <= count {
-            return None;
-        }
-        let middle = |k: usize| {
-            let mut all: Vec<f64> = rows.iter().map(|row| row[k]).collect();
-            all.sort_by(f64::total_cmp);
-            let half = &all[all.len() / 4..all.len() - all.len() / 4];
-            half.iter().sum::<f64>() / half.len() as f64
-        };
-        let light = along().enumerate().map(|(k, s)| [s, middle(k)]).collect();
-        Some(Self { light, most: 2.0 * (half + 2.0) })
+/// What y = (a + b s) q(s) leaves of a cut, squared, by its best a and b: a straight line, since
+/// light falls off slowly across a face, times what the slot lets by. Both go as far to the left as
+/// to the right, q farther than the cut, and Σ q² s is 0.
+fn unexplained(q: &[f64], cut: &[f64]) -> f64 {
+    let middle = 0.5 * (cut.len() - 1) as f64;
+    let beyond = (q.len() - cut.len()) / 2;
+    let (mut level, mut tilt, mut all) = ([0.0; 2], [0.0; 2], 0.0);
+    for (k, (y, q)) in cut.iter().zip(&q[beyond..]).enumerate() {
+        let (q, s) = (*q, k as f64 - middle);
+        level = [level[0] + q * q, level[1] + q * y];
+        tilt = [tilt[0] + q * q * s * s, tilt[1] + q * y * s];
+        all += y * y;
     }
+    all - level[1] * level[1] / level[0] - tilt[1] * tilt[1] / tilt[0]
+}
 
-    /// The slot that explains it best.
-    fn slot(&self, blur: f64) -> Option<Slot> {
-        let count = ((self.most - LEAST) / TRY) as usize;
-        let missing = |k: usize| LEAST + k as f64 * TRY;
-        let left: Vec<f64> = (0..=count).map(|k| self.left(missing(k), blur)).collect();
-        let k = (1..count).min_by(|a, b| left[*a].total_cmp(&left[*b]))?;
-        // The lowest point of the parabola through three tries.
-        let bend = left[k - 1] - 2.0 * left[k] + left[k + 1];
-        let beside = if bend > 0.0 { 0.5 * (left[k - 1] - left[k + 1]) / bend } else { 0.0 };
-        let level = self.light.iter().map(|l| l[1]).sum::<f64>() / self.light.len() as f64;
-        let left = left[k] / (level * level);
-        (level > 0.0).then(|| Slot { missing: missing(k) + beside.clamp(-1.0, 1.0) * TRY, left })
-    }
+/// How many slots are tried across a mouth of so many pixels to either side.
+fn tries(half: usize) -> usize {
+    ((2.0 * (half as f64 + 2.0) - LEAST) / TRY) as usize
+}
 
-    /// What y = (a + b s) q(s) leaves of the cut, squared, by its best a and b: a straight line,
-    /// since light falls off slowly across a face, times what the slot lets by.
-    fn left(&self, missing: f64, blur: f64) -> f64 {
-        let (mut m, mut rhs, mut all) = ([0.0; 3], [0.0; 2], 0.0);
-        for &[s, y] in &self.light {
-            let q = 1.0 - taken(s, missing, blur);
-            (m[0], m[1], m[2]) = (m[0] + q * q, m[1] + q * q * s, m[2] + q * q * s * s);
-            (rhs[0], rhs[1], all) = (rhs[0] + q * y, rhs[1] + q * y * s, all + y * y);
-        }
-        let det = m[0] * m[2] - m[1] * m[1];
-        let [a, b] = [m[2] * rhs[0] - m[1] * rhs[1], m[0] * rhs[1] - m[1] * rhs[0]];
-        all - (a * rhs[0] + b * rhs[1]) / det
-    }
+/// Pixels of light that the `k`th slot takes away.
+fn missing(k: usize) -> f64 {
+    LEAST + k as f64 * TRY
 }
 
 /// Share of the light that a blurred slot takes away, `s` pixels from its middle: a box as deep as
-/// slots are in most light, as wide as `missing` wants, under a Gaussian.
+/// slots are in most light, as wide as `missing` wants, under a Gaussian, as pixels read it.
 fn taken(s: f64, missing: f64, blur: f64) -> f64 {
     let depth = 1.0 - USUAL[0];
     let (half, scale) = (0.5 * missing / depth, blur * std::f64::consts::SQRT_2);
-    0.5 * depth * (erf((s + half) / scale) - erf((s - half) / scale))
+    let on = |s: f64| 0.5 * depth * (erf((s + half) / scale) - erf((s - half) / scale));
+    0.25 * (on(s - SPREAD) + on(s + SPREAD)) + 0.5 * on(s)
 }
 
 /// Between pixels' middles; `None` where any of the four is not known.
@@ -186,7 +230,7 @@ fn sampled(value: &Grid<f32>, [x, y]: [f64; 2]) -> Option<f64> {
 
 /// Standard error of a piece's missing light, pixels: how much is missing along straight pieces
 /// where no crack was found (robust). `None` where too few places are seen.
-pub(super) fn scatter(value: &Grid<f32>, lines: &[Line], blur: f64) -> Option<f64> {
+pub(super) fn scatter(value: &Grid<f32>, lines: &[Line], slots: &Slots) -> Option<f64> {
     let mut taken = Grid::new(value.width, value.height, false);
     let reach = (2.0 * BESIDE) as isize;
     for p in lines.iter().flat_map(|line| line.points.iter().step_by(4)) {
@@ -212,7 +256,7 @@ pub(super) fn scatter(value: &Grid<f32>, lines: &[Line], blur: f64) -> Option<f6
             let s = j as f64 - 0.5 * PIECE as f64;
             ([at[0] + s * cos, at[1] + s * sin], [-sin, cos])
         });
-        Some(Cut::of(value, places, 1.0)?.slot(blur)?.missing)
+        midmean(Cuts::of(value, places, 1.0)?.slots(slots).map(|s| s.missing).collect())
     };
     if value.data.is_empty() {
         return None;
@@ -239,14 +283,9 @@ mod tests {
         for i in 0..w * h {
             let (x, y) = ((i % w) as f64, (i / w) as f64);
             // The line falls by 4 pixels from left to right.
-            let middle = 28.0 + 4.0 * x / w as f64;
-            let covered = (0..20)
-                .filter(|k| {
-                    let s = y + (f64::from(*k) + 0.5) / 20.0 - middle;
-                    s.abs() < 0.5 * width
-                })
-                .count() as f64
-                / 20.0;
+            let middle = 28.0 + 4.0 * (x + 0.5) / w as f64;
+            let end = |half: f64| (middle + half).clamp(y, y + 1.0);
+            let covered = end(0.5 * width) - end(-0.5 * width);
             let light = 0.4 + 0.1 * y / h as f64;
             value.data[i] = (light * (1.0 - 0.9 * covered)) as f32;
         }
@@ -255,7 +294,7 @@ mod tests {
             *v *= 1.0 + grain as f32 * key.normal(i as u32) as f32;
         }
         let points: Vec<[f64; 2]> =
-            (10..150).map(|x| [f64::from(x) + 0.5, 28.0 + 4.0 * f64::from(x) / w as f64]).collect();
+            (10..150).map(|x| f64::from(x) + 0.5).map(|x| [x, 28.0 + 4.0 * x / w as f64]).collect();
         let half = vec![1.5; points.len()];
         (value, Line { points, half, piece: 0 })
     }
@@ -266,8 +305,8 @@ mod tests {
         for width in [0.25, 0.5, 1.0, 2.0] {
             for blur in [0.5, 0.8, 1.2] {
                 let (value, line) = drawn(width, blur, 0.0);
-                let sharp = super::blur(&value, std::slice::from_ref(&line));
-                let pieces = pieces(&value, &line, sharp);
+                let slots = Slots::of(&value, std::slice::from_ref(&line));
+                let pieces = pieces(&value, &line, &slots);
                 assert!(pieces.len() >= 8);
                 let mean = pieces.iter().map(|p| p.missing).sum::<f64>() / pieces.len() as f64;
                 assert!(
@@ -290,7 +329,7 @@ mod tests {
                 }
             }
         }
-        let worst = pieces(&value, &line, SHARP)
+        let worst = pieces(&value, &line, &Slots::new(SHARP, 2))
             .iter()
             .map(|p| (p.missing - 0.45).abs())
             .fold(0.0, f64::max);
@@ -301,9 +340,11 @@ mod tests {
     #[test]
     fn errors_are_as_large_as_the_scatter_says() {
         let (value, line) = drawn(0.4, 0.8, 0.03);
-        let error = scatter(&value, std::slice::from_ref(&line), SHARP).unwrap();
+        let lines = std::slice::from_ref(&line);
+        let slots = Slots::of(&value, lines);
+        let error = scatter(&value, lines, &slots).unwrap();
         let z: Vec<f64> =
-            pieces(&value, &line, SHARP).iter().map(|p| (p.missing - 0.36) / error).collect();
+            pieces(&value, &line, &slots).iter().map(|p| (p.missing - 0.36) / error).collect();
         let rms = (z.iter().map(|z| z * z).sum::<f64>() / z.len() as f64).sqrt();
         assert!((0.4..2.0).contains(&rms), "{rms} with {error}");
         assert!(error < 0.1, "{error}");
