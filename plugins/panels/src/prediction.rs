@@ -139,7 +139,7 @@ pub(crate) fn gather(
         latest.before.clear();
         if latest.result.is_none() && pieces.1 > 0 {
             toasts.say(tr!("The prediction of {} is done", scene.0.name));
-            log.say(tr!("predicted {}: {} members", scene.0.name, scene.0.members.len()));
+            log.say(tr!("predicted {}; members: {}", scene.0.name, scene.0.members.len()));
         }
         latest.result = progress.prediction().map(Arc::new);
     }
