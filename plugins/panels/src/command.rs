@@ -323,7 +323,8 @@ pub(crate) fn palette(ui: &Ui, world: &mut World) {
                 palette.chosen = 0;
             }
             let most = (screen.height() - 140.0).clamp(60.0, 420.0);
-            ScrollArea::vertical().max_height(most).auto_shrink([false, true]).show(ui, |ui| {
+            let list = ScrollArea::vertical().max_height(most).min_scrolled_height(most);
+            list.auto_shrink([false, true]).show(ui, |ui| {
                 for (line, &index) in fits.iter().enumerate() {
                     let is_chosen = line == palette.chosen;
                     let row = row(ui, &commands[index], is_chosen);
