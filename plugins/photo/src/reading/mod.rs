@@ -47,7 +47,7 @@ pub struct FaceReading {
     /// By tenth of the axis from its start, m² of the face of which the reflectance is known: of
     /// all else nothing is said.
     pub seen_m2: [f64; PARTS],
-    /// The narrowest crack that takes away four standard errors of light over 16 pixels of its
+    /// The narrowest crack that takes away eight standard errors of light over 16 pixels of its
     /// length, mm: of narrower ones nothing is said. None where too little is seen to tell.
     pub narrowest_mm: Option<f64>,
     /// Millimetres a pixel of the map that was read.
