@@ -6,9 +6,9 @@
     d  relit with global illumination                --light all
 
     python3 question.py OUT [--intrados target/release/intrados]
-    python3 question.py OUT --marks target/release/examples/marks --weights direct=DIRECT.f32 global=GLOBAL.f32
+    python3 question.py OUT --marks target/release/examples/marks --weights pasted=PASTED.f32 direct=DIRECT.f32 global=GLOBAL.f32
 
-The second reads the relit maps of d with networks that were trained alike on other lessons (direct light; with bounces), pixels of the
+The second reads the relit maps of d with networks that were trained alike on other lessons (pasted, without light; direct light; with bounces), pixels of the
 mask against the planted cracks at 1 mm.
 
 OUT holds members of members.py. What was read is kept (OUT/K/read-WAY.json) and not read again. One JSON line a member and way: F1 of
@@ -145,8 +145,8 @@ if __name__ == "__main__":
         f1 = {name: trained(a.marks, a.out, folders, name, weights) for name, weights in named.items()}
         for name in f1:
             print(json.dumps({"trained": name, "f1": round(float(np.mean(f1[name])), 3), "by_member": [round(float(v), 3) for v in f1[name]]}))
-        if {"direct", "global"} <= set(f1):
-            print(json.dumps({"global_against": "direct", "f1": paired(f1["global"], f1["direct"], np.random.default_rng(1))}))
+        for other in set(f1) - {"global"} if "global" in f1 else ():
+            print(json.dumps({"global_against": other, "f1": paired(f1["global"], f1[other], np.random.default_rng(1))}))
         raise SystemExit
     rows = {way: [] for way in WAYS}
     for folder in folders:
