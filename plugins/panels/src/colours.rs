@@ -44,7 +44,11 @@ pub(crate) fn damage(value: f32, is_forecast: bool) -> [u8; 3] {
 
 /// The same for a brush.
 pub(crate) fn damage_ink(value: f32, is_forecast: bool) -> Color32 {
-    let [r, g, b] = damage(value, is_forecast);
+    ink(damage(value, is_forecast))
+}
+
+/// sRGB bytes for a brush.
+pub(crate) fn ink([r, g, b]: [u8; 3]) -> Color32 {
     Color32::from_rgb(r, g, b)
 }
 

@@ -16,10 +16,7 @@ use intrados_stage::{Jobs, Task, aside};
 use intrados_transport::Side;
 use rayon::prelude::*;
 
-use crate::{
-    Colours, Look, Quantity, orbit,
-    scale::{self, Ranges},
-};
+use crate::{Colours, Look, Quantity, colours, orbit, scale::Ranges};
 
 /// Pixels of a picture of a field, however small the camera's own are.
 const PIXELS: u32 = 200_000;
@@ -175,6 +172,6 @@ fn painted(
 
 /// Values as an image of so many columns.
 pub(crate) fn image(values: &[f32], width: usize, scale: &FalseColour) -> ColorImage {
-    let pixels = values.par_iter().map(|&v| scale::ink(scale.encode(v))).collect();
+    let pixels = values.par_iter().map(|&v| colours::ink(scale.encode(v))).collect();
     ColorImage::new([width, values.len() / width.max(1)], pixels)
 }

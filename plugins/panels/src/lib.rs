@@ -20,6 +20,7 @@ mod export;
 mod fields;
 mod history;
 mod inspector;
+mod kept;
 mod layout;
 mod log;
 mod members;

@@ -12,7 +12,7 @@ use intrados_light::{
 use intrados_transport::Side;
 use rayon::prelude::*;
 
-use crate::{Colours, Statistics, Viewpoint, scale};
+use crate::{Colours, Statistics, Viewpoint, colours};
 
 /// A large film is developed in so many bands of rows, one a frame: all of it at once would take
 /// half a frame.
@@ -298,8 +298,7 @@ pub(crate) fn pixels(
                             u.at((x as f32 + 0.5) / w as f32, (y as f32 + 0.5) / h as f32)
                         })
                     };
-                    let [r, g, b] = tone.encode(sum.unwrap_or_else(below));
-                    Color32::from_rgb(r, g, b)
+                    colours::ink(tone.encode(sum.unwrap_or_else(below)))
                 }
             };
         }
@@ -314,7 +313,7 @@ pub(crate) fn error_scale(look: &Look) -> FalseColour {
 
 fn error_colour(scale: &FalseColour, value: Option<(Vec3, Vec3)>) -> Color32 {
     let relative = value.map(|(mean, variance)| relative_error(mean, variance));
-    scale::ink(scale.encode(relative.filter(|r| r.is_finite()).unwrap_or(f32::NAN)))
+    colours::ink(scale.encode(relative.filter(|r| r.is_finite()).unwrap_or(f32::NAN)))
 }
 
 /// Standard error of the luminance over the luminance, the channels' errors taken as fully
@@ -371,9 +370,9 @@ mod tests {
         let of = |error: f32| {
             error_colour(&error_scale(&look), Some((Vec3::ONE, Vec3::splat(error * error))))
         };
-        assert_eq!(of(1e-5), scale::ink(map.at(0.0)));
-        assert_eq!(of(2.0), scale::ink(map.at(1.0)));
-        assert_eq!(of(f32::INFINITY), crate::colours::UNKNOWN);
-        assert_eq!(error_colour(&error_scale(&look), None), crate::colours::UNKNOWN);
+        assert_eq!(of(1e-5), colours::ink(map.at(0.0)));
+        assert_eq!(of(2.0), colours::ink(map.at(1.0)));
+        assert_eq!(of(f32::INFINITY), colours::UNKNOWN);
+        assert_eq!(error_colour(&error_scale(&look), None), colours::UNKNOWN);
     }
 }

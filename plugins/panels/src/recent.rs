@@ -1,16 +1,13 @@
 //! Files that were opened lately.
 
-use std::{
-    io::Write,
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
 use bevy_ecs::resource::Resource;
 
+use crate::kept;
+
 /// How many are remembered.
 const MOST: usize = 10;
-/// A list longer than this is not ours.
-const LARGEST: u64 = 1 << 20;
 
 /// Files that were opened lately, newest first.
 #[derive(Resource, Debug, Default)]
@@ -22,12 +19,7 @@ pub(crate) struct Recent {
 impl Recent {
     /// Reads the list; a file that is missing or broken is an empty list.
     pub(crate) fn read(file: Option<PathBuf>) -> Self {
-        let text = file
-            .as_deref()
-            .filter(|f| f.metadata().is_ok_and(|m| m.len() < LARGEST))
-            .and_then(|f| std::fs::read_to_string(f).ok());
-        let mut list: Vec<PathBuf> =
-            text.and_then(|t| serde_json::from_str(&t).ok()).unwrap_or_default();
+        let mut list: Vec<PathBuf> = file.as_deref().and_then(kept::read).unwrap_or_default();
         list.truncate(MOST);
         Self { list, file }
     }
@@ -51,22 +43,10 @@ impl Recent {
         self.write();
     }
 
-    /// Not being able to write it is no reason to trouble anybody.
     fn write(&self) {
-        let Some(file) = &self.file else { return };
-        if let Err(error) = self.try_write(file) {
-            tracing::warn!(
-                "the list of recent files was not written to {}: {error}",
-                file.display()
-            );
+        if let Some(file) = &self.file {
+            kept::write(file, "the list of recent files was", &self.list);
         }
-    }
-
-    fn try_write(&self, file: &Path) -> std::io::Result<()> {
-        let folder = file.parent().unwrap_or(Path::new("."));
-        std::fs::create_dir_all(folder)?;
-        let text = serde_json::to_string_pretty(&self.list)?;
-        intrados_stage::file::put(file, |out| out.write_all(text.as_bytes()))
     }
 }
 

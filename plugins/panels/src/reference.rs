@@ -198,8 +198,7 @@ fn size(camera: &Camera) -> [usize; 2] {
 }
 
 fn colour(tone: &Tone, radiance: Vec3) -> Color32 {
-    let [r, g, b] = tone.encode(radiance);
-    Color32::from_rgb(r, g, b)
+    colours::ink(tone.encode(radiance))
 }
 
 /// Keeps the picture as it is now.

@@ -4,11 +4,11 @@
 use std::collections::BTreeMap;
 
 use bevy_ecs::prelude::*;
-use egui::{Color32, Painter, Rect, Shape, Stroke, Ui, pos2, vec2};
+use egui::{Painter, Rect, Shape, Stroke, Ui, pos2, vec2};
 use intrados_light::tone::{ABOVE, BELOW, ColourMap, FalseColour};
 use serde::{Deserialize, Serialize};
 
-use crate::{lang::drag, number::significant};
+use crate::{colours::ink, lang::drag, number::significant};
 
 /// Numbers of bands to choose from; 0: none.
 const BANDS: [u8; 3] = [0, 5, 10];
@@ -80,11 +80,6 @@ pub(crate) fn choices(now: Colours) -> [Vec<(String, Colours)>; 2] {
     let maps = ColourMap::ALL.map(|map| (name(map), Colours { map, ..now }));
     let bands = BANDS.map(|bands| (banded(bands), Colours { bands, ..now }));
     [maps.into(), bands.into()]
-}
-
-/// For a brush.
-pub(crate) fn ink([r, g, b]: [u8; 3]) -> Color32 {
-    Color32::from_rgb(r, g, b)
 }
 
 /// What a map is called.

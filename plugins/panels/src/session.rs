@@ -2,7 +2,6 @@
 
 use std::{
     fs::{self, File, TryLockError},
-    io::Write,
     path::{Path, PathBuf},
     time::{Duration, Instant},
 };
@@ -15,15 +14,12 @@ use intrados_scene::{
     Scene,
     plugin::{CurrentScene, SceneChanged},
 };
-use intrados_stage::file;
 use serde::{Deserialize, Serialize};
 
-use crate::{Action, Actions, Selection, attach::Form, photos::Photos, workspace::Desk};
+use crate::{Action, Actions, Selection, attach::Form, kept, photos::Photos, workspace::Desk};
 
 /// Schema of the file.
 const SCHEMA: &str = "intrados.session/1";
-/// A larger file is none of ours.
-const LARGEST: u64 = 1 << 20;
 /// It is written at most so often.
 const EVERY: Duration = Duration::from_millis(500);
 
@@ -72,10 +68,7 @@ impl Session {
                 return Self::default();
             }
         };
-        let is_ours = file.metadata().is_ok_and(|m| m.len() < LARGEST);
-        let text = is_ours.then(|| fs::read_to_string(&file).ok()).flatten();
-        let left = text.and_then(|t| serde_json::from_str::<Kept>(&t).ok());
-        let left = left.filter(|kept| kept.schema == SCHEMA);
+        let left = kept::read(&file).filter(|kept: &Kept| kept.schema == SCHEMA);
         let mut session = Self::default();
         (session.file, session.lock, session.left) = (Some(file), Some(lock), left);
         session
@@ -89,9 +82,7 @@ impl Session {
             return;
         }
         self.last = Some(Instant::now());
-        if let Err(error) = write(file, &now) {
-            tracing::warn!("the session was not written to {}: {error}", file.display());
-        }
+        kept::write(file, "the session was", &now);
         self.written = Some(now);
     }
 }
@@ -119,11 +110,6 @@ fn locked(path: &Path) -> std::io::Result<File> {
         Err(TryLockError::WouldBlock) => Err(std::io::Error::other("another window is open")),
         Err(TryLockError::Error(error)) => Err(error),
     }
-}
-
-fn write(path: &Path, kept: &Kept) -> std::io::Result<()> {
-    let text = serde_json::to_string_pretty(kept)?;
-    file::put(path, |out| out.write_all(text.as_bytes()))
 }
 
 /// Keeps what is open, and goes on with what was left once its scene is there.

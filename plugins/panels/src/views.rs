@@ -2,7 +2,6 @@
 
 use std::{
     collections::BTreeMap,
-    io::Write,
     path::{Path, PathBuf},
     sync::Arc,
 };
@@ -11,10 +10,8 @@ use bevy_ecs::prelude::*;
 use egui::{TextEdit, Ui};
 use intrados_scene::{Camera, Scene, plugin::CurrentScene};
 
-use crate::{Action, Actions, Viewpoint, structure::Structure, workspace::Desk};
+use crate::{Action, Actions, Viewpoint, kept, structure::Structure, workspace::Desk};
 
-/// A larger file is none of ours.
-const LARGEST: u64 = 1 << 20;
 /// Most views of a scene.
 const MOST: usize = 100;
 
@@ -32,9 +29,7 @@ pub(crate) struct Views {
 impl Views {
     /// As they were kept; a file that is missing or broken has none.
     pub(crate) fn read(file: Option<PathBuf>) -> Self {
-        let ours = file.as_deref().filter(|f| f.metadata().is_ok_and(|m| m.len() < LARGEST));
-        let text = ours.and_then(|f| std::fs::read_to_string(f).ok());
-        let kept = text.and_then(|t| serde_json::from_str(&t).ok()).unwrap_or_default();
+        let kept = file.as_deref().and_then(kept::read).unwrap_or_default();
         Self { kept, file, ..Self::default() }
     }
 
@@ -72,18 +67,10 @@ impl Views {
         self.write();
     }
 
-    /// Not being able to write them is no reason to trouble anybody.
     fn write(&self) {
-        let Some(file) = &self.file else { return };
-        if let Err(error) = self.try_write(file) {
-            tracing::warn!("the views were not written to {}: {error}", file.display());
+        if let Some(file) = &self.file {
+            kept::write(file, "the views were", &self.kept);
         }
-    }
-
-    fn try_write(&self, file: &Path) -> std::io::Result<()> {
-        std::fs::create_dir_all(file.parent().unwrap_or(Path::new(".")))?;
-        let text = serde_json::to_string_pretty(&self.kept)?;
-        intrados_stage::file::put(file, |out| out.write_all(text.as_bytes()))
     }
 }
 

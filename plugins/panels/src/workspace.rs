@@ -3,8 +3,7 @@
 
 use std::{
     collections::{BTreeMap, BTreeSet},
-    io::Write,
-    path::{Path, PathBuf},
+    path::PathBuf,
 };
 
 use bevy_ecs::prelude::*;
@@ -16,7 +15,7 @@ use egui_tiles::{
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    Colours, Language, Place,
+    Colours, Language, Place, kept,
     lang::{self, term},
     place::{Panel, Panels},
     scale::Ranges,
@@ -24,8 +23,6 @@ use crate::{
 
 /// Schema of the file.
 const SCHEMA: &str = "intrados.layout/1";
-/// A larger file is none of ours.
-const LARGEST: u64 = 1 << 20;
 /// So deep may tiles lie in each other.
 const DEEPEST: usize = 32;
 /// Panels of ours that only experts open: what walks do, and how well.
@@ -251,11 +248,7 @@ pub(crate) struct Desk {
 impl Desk {
     /// As it was left; where nothing was, or nothing that makes sense, as it is at first.
     pub(crate) fn read(file: Option<PathBuf>) -> Self {
-        let text = file
-            .as_deref()
-            .filter(|f| f.metadata().is_ok_and(|m| m.len() < LARGEST))
-            .and_then(|f| std::fs::read_to_string(f).ok());
-        let kept: Option<Kept> = text.and_then(|t| serde_json::from_str(&t).ok());
+        let kept: Option<Kept> = file.as_deref().and_then(kept::read);
         let kept = kept.filter(|k| k.schema == SCHEMA);
         let (chosen, theme, language, scales, laid) = kept.map_or_else(Default::default, |k| {
             let of = |kept: Option<KeptLayout>, workspace| Laid::of(kept?, workspace);
@@ -266,23 +259,14 @@ impl Desk {
         Self { chosen, shown: chosen, theme, language, scales, laid, file, ..Self::default() }
     }
 
-    /// Not being able to write it is no reason to trouble anybody.
     fn write(&self) {
         let Some(file) = &self.file else { return };
-        if let Err(error) = self.try_write(file) {
-            tracing::warn!("the layout was not written to {}: {error}", file.display());
-        }
-    }
-
-    fn try_write(&self, file: &Path) -> std::io::Result<()> {
         let [inspector, expert] = &self.laid;
         let [inspector, expert] = [inspector, expert].map(|l| l.as_ref().map(Laid::kept));
         let (schema, chosen, theme) = (SCHEMA.into(), self.chosen, self.theme.into());
         let (language, (colours, ranges)) = (self.language, self.scales.clone());
         let kept = Kept { schema, chosen, theme, language, colours, ranges, inspector, expert };
-        std::fs::create_dir_all(file.parent().unwrap_or(Path::new(".")))?;
-        let text = serde_json::to_string_pretty(&kept)?;
-        intrados_stage::file::put(file, |out| out.write_all(text.as_bytes()))
+        kept::write(file, "the layout was", &kept);
     }
 
     pub(crate) fn shown(&self) -> Workspace {

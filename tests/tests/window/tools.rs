@@ -294,7 +294,8 @@ fn a_picture_is_held_against_its_reference() {
     assert_eq!(wiped[..middle - aside], reference[..middle - aside]);
     assert_eq!(wiped[middle + aside..], own[middle + aside..]);
     let camera = window.with(|w| w.resource::<Viewpoint>().camera().cloned());
-    drag(&mut window, rect, [0.5, 0.25]);
+    let at = |x: f32| rect.lerp_inside(egui::vec2(x, 0.5));
+    draw(&mut window, at(0.5), at(0.25));
     let wiped = columns(&window.picture(), rect);
     assert_eq!(wiped[count / 4 + aside..], own[count / 4 + aside..], "the divider stays");
     assert_eq!(wiped[..count / 4 - aside], reference[..count / 4 - aside]);
@@ -315,21 +316,6 @@ fn columns(picture: &image::RgbImage, rect: egui::Rect) -> Vec<Vec<[u8; 3]>> {
     let rows = range(rect.top(), rect.bottom());
     let column = |x: u32| rows.clone().map(|y| picture.get_pixel(x, y).0).collect();
     range(rect.left(), rect.right()).map(column).collect()
-}
-
-/// Drags from one share of the width to another, at half the height.
-fn drag(window: &mut Window, rect: egui::Rect, [from, to]: [f32; 2]) {
-    let at = |x: f32| rect.lerp_inside(egui::vec2(x, 0.5));
-    window.harness.hover_at(at(from));
-    window.frames(2);
-    window.harness.drag_at(at(from));
-    window.frames(2);
-    for k in 1..=4 {
-        window.harness.hover_at(at(from + (to - from) * k as f32 / 4.0));
-        window.frame();
-    }
-    window.harness.drop_at(at(to));
-    window.frames(3);
 }
 
 /// As it looks: the path-traced picture comes from where the structure is looked at, and goes again.
@@ -382,24 +368,14 @@ fn evidence_is_placed_by_dragging_along_its_member() {
     let rect = window.harness.get_by_label("Damage of members").rect();
     window.ask(Action::Fill(Vec::new(), None));
     window.frames(3);
-    let drag = |window: &mut Window, from: f32, to: f32| {
-        let at = |y: f32| rect.lerp_inside(egui::vec2(0.5, y));
-        window.harness.drag_at(at(from));
-        window.frames(2);
-        for k in 1..=8 {
-            window.harness.hover_at(at(from + (to - from) * k as f32 / 8.0));
-            window.frame();
-        }
-        window.harness.drop_at(at(to));
-        window.frames(3);
-    };
+    let at = |y: f32| rect.lerp_inside(egui::vec2(0.5, y));
     let along = |window: &Window| -> f32 {
         let field = window.harness.get_by_label("along from, 0 to 1");
         field.accesskit_node().value().unwrap_or_default().parse().unwrap_or(f32::NAN)
     };
-    drag(&mut window, 0.5, 0.7);
+    draw(&mut window, at(0.5), at(0.7));
     let low = along(&window);
-    drag(&mut window, 0.7, 0.3);
+    draw(&mut window, at(0.7), at(0.3));
     let high = along(&window);
     assert!((0.0..1.0).contains(&low) && high > low + 0.1, "{low} {high}");
 }

@@ -805,7 +805,7 @@ fn legend(ui: &Ui, rect: Rect, quantity: Quantity, name: &str, shown: &Shown) {
         painter.rect_filled(
             Rect::from_min_max(pos2(bar.left(), y(k + 1)), pos2(bar.right(), y(k) + 0.5)),
             0.0,
-            scale::ink(quantity.colour(&shown.scale, value)),
+            colours::ink(quantity.colour(&shown.scale, value)),
         );
     }
     scale::ends(&painter, &shown.scale, bar, true);
