@@ -160,13 +160,15 @@ impl Principal {
 /// Eigenvalues and, as rows, eigenvectors by Jacobi's rotations (Golub and Van Loan 2013, § 8.5):
 /// for three by three twice as fast as by tridiagonal form, and as exact.
 fn rotated(mut a: [[f64; 3]; 3]) -> ([f64; 3], Frame) {
-    /// Convergence is quadratic: four or five do.
+    /// Convergence is quadratic: three or four do.
     const SWEEPS: usize = 12;
+    /// What another sweep would turn by less than rounding.
+    const NEGLIGIBLE: f64 = 1e-18;
     let mut rows = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     for _ in 0..SWEEPS {
         let off = a[0][1].abs() + a[0][2].abs() + a[1][2].abs();
         if off.is_nan()
-            || off <= f64::EPSILON * f64::EPSILON * (a[0][0].abs() + a[1][1].abs() + a[2][2].abs())
+            || off <= NEGLIGIBLE * (a[0][0].abs() + a[1][1].abs() + a[2][2].abs())
         {
             break;
         }
@@ -211,17 +213,12 @@ pub(crate) fn transposed(frame: &Frame) -> Frame {
 /// Components of a stress along the axes of `frame`: σ′ = Q σ Qᵀ.
 #[must_use]
 pub fn rotate_stress(stress: &Voigt, frame: &Frame) -> Voigt {
-    let full = |a: usize, b: usize| match (a.min(b), a.max(b)) {
-        (0, 1) => stress[3],
-        (1, 2) => stress[4],
-        (0, 2) => stress[5],
-        (i, _) => stress[i],
-    };
+    let [xx, yy, zz, xy, yz, zx] = *stress;
+    let half = frame.map(|[x, y, z]| {
+        [x * xx + y * xy + z * zx, x * xy + y * yy + z * yz, x * zx + y * yz + z * zz]
+    });
     AXES.map(|(i, j)| {
-        (0..3)
-            .flat_map(|a| (0..3).map(move |b| (a, b)))
-            .map(|(a, b)| frame[i][a] * full(a, b) * frame[j][b])
-            .sum()
+        half[i][0] * frame[j][0] + half[i][1] * frame[j][1] + half[i][2] * frame[j][2]
     })
 }
 
@@ -242,17 +239,20 @@ pub(crate) fn rotate_tangent(local: &Tangent, frame: &Frame) -> Tangent {
             if m == n { shear * a[m] * b[m] } else { 0.5 * shear * (a[m] * b[n] + a[n] * b[m]) }
         })
     });
-    let product: Tangent = local.map(|row| combine(&row, &turn));
-    let columns: Tangent = std::array::from_fn(|i| turn.map(|row| row[i]));
-    columns.map(|column| combine(&column, &product))
+    // Rows of C T, then of Tᵀ (C T).
+    let (mut product, mut world) = ([ZERO; 6], [ZERO; 6]);
+    for (row, weights) in product.iter_mut().zip(local) {
+        weights.iter().zip(&turn).for_each(|(w, turn)| add_times(row, *w, turn));
+    }
+    for (weights, product) in turn.iter().zip(&product) {
+        world.iter_mut().zip(weights).for_each(|(row, w)| add_times(row, *w, product));
+    }
+    world
 }
 
-/// Σ weights[k] · rows[k].
-fn combine(weights: &Voigt, rows: &Tangent) -> Voigt {
-    weights
-        .iter()
-        .zip(rows)
-        .fold(ZERO, |sum, (w, row)| std::array::from_fn(|i| sum[i] + w * row[i]))
+/// sum += weight · row.
+fn add_times(sum: &mut Voigt, weight: f64, row: &Voigt) {
+    sum.iter_mut().zip(row).for_each(|(s, r)| *s += weight * r);
 }
 
 /// Axes r, θ, z at `point` of the cylinder around the line through `origin` along `axis`. On that
@@ -282,21 +282,29 @@ pub fn cylindrical(point: [f64; 3], origin: [f64; 3], axis: [f64; 3]) -> Frame {
 /// An equivalent strain and its derivative by the strain.
 pub(crate) type Equivalent = (f64, Voigt);
 
-/// The largest and the least principal stress, without directions: roots of the characteristic
-/// polynomial by the angle of its three real ones (Smith 1961); exact to the square root of
-/// rounding.
+/// Principal stresses, largest first, without directions: roots of the characteristic polynomial by
+/// the angle of its three real ones (Smith 1961); exact to the square root of rounding.
 #[must_use]
-pub(crate) fn extreme_principals(s: &Voigt) -> [f64; 2] {
+pub(crate) fn principals(s: &Voigt) -> [f64; 3] {
     let mean = i1(s) / 3.0;
     let [a, b, c] = [s[0] - mean, s[1] - mean, s[2] - mean];
     let [xy, yz, zx] = [s[3], s[4], s[5]];
     let size = ((a * a + b * b + c * c) / 6.0 + (xy * xy + yz * yz + zx * zx) / 3.0).sqrt();
     if size <= 0.0 {
-        return [mean; 2];
+        return [mean; 3];
     }
     let det = a * (b * c - yz * yz) - xy * (xy * c - yz * zx) + zx * (xy * yz - b * zx);
     let angle = (0.5 * det / size.powi(3)).clamp(-1.0, 1.0).acos() / 3.0;
-    [0.0, 2.0].map(|k| mean + 2.0 * size * (angle + k * std::f64::consts::FRAC_PI_3).cos())
+    let [most, least] = [0.0, 2.0]
+        .map(|k| mean + 2.0 * size * (angle + k * std::f64::consts::FRAC_PI_3).cos());
+    [most, 3.0 * mean - most - least, least]
+}
+
+/// The largest and the least of them.
+#[must_use]
+pub(crate) fn extreme_principals(s: &Voigt) -> [f64; 2] {
+    let [most, _, least] = principals(s);
+    [most, least]
 }
 
 /// Modified von Mises equivalent strain (de Vree, Brekelmans and van Gils 1995) with `k` = f_c/f_t:

@@ -274,19 +274,28 @@ impl Cracked {
     }
 }
 
-/// Stress and tangent at a damage of compression, from those before (tangent in the world's axes):
-/// each principal component that presses counts 1 − d_c. The tangent is symmetric and positive, and
-/// the secant where one component presses alone.
-fn crushed(principal: &Principal, tangent: &Tangent, damage: f64) -> (Voigt, Tangent) {
+/// Stress and tangent at a damage of compression, from those before (the tangent in `axes`): each
+/// principal component that presses counts 1 − d_c. The tangent is symmetric and positive, and the
+/// secant where one component presses alone.
+fn crushed(
+    principal: &Principal,
+    tangent: &Tangent,
+    axes: &Frame,
+    damage: f64,
+) -> (Voigt, Tangent) {
     if damage == 0.0 {
-        return (principal.as_stress(), *tangent);
+        return (principal.as_stress(), tensor::rotate_tangent(tangent, axes));
     }
     let left = principal.values.map(|s| if s < 0.0 { 1.0 - damage } else { 1.0 });
     let stress =
         Principal { values: std::array::from_fn(|i| left[i] * principal.values[i]), ..*principal };
-    let pair = |i: usize, j: usize| (left[i] * left[j]).powf(0.25);
+    let pair = |i: usize, j: usize| (left[i] * left[j]).sqrt().sqrt();
     let root = [pair(0, 0), pair(1, 1), pair(2, 2), pair(0, 1), pair(1, 2), pair(2, 0)];
-    let mut local = tensor::rotate_tangent(tangent, &tensor::transposed(&principal.directions));
+    // The axes in those of the stress.
+    let within = axes.map(|n| {
+        principal.directions.map(|d| n.iter().zip(d).map(|(n, d)| n * d).sum::<f64>())
+    });
+    let mut local = tensor::rotate_tangent(tangent, &within);
     for (row, a) in local.iter_mut().zip(root) {
         row.iter_mut().zip(root).for_each(|(k, b)| *k *= a * b);
     }
@@ -363,7 +372,10 @@ impl Concrete {
             return sound;
         }
         let before = &state.planes;
-        let axes = before.turned(&effective);
+        let axes = match growth.is_some() && before.cracked() {
+            true => before.axes,
+            false => before.turned(&effective),
+        };
         let bands = axes.map(|n| self.along(&n, step).min(step.spacing(&n)));
         let laws = bands.map(|band| {
             Knee::of(self.elastic.modulus, clock.aged.fctm, self.properties.fracture_energy, band)
@@ -393,7 +405,7 @@ impl Concrete {
             kappa = next;
             found = self.judge_planes(&point, kappa);
         }
-        let response = self.cracked_response(&point, &found, kappa, bands, step);
+        let response = self.cracked_response(&point, &found, kappa, bands, step, growth);
         let mechanical = tensor::sub(
             &effective,
             &tensor::scale(&found.drive, creep / (self.elastic.modulus * clock.nonlinear)),
@@ -462,7 +474,7 @@ impl Concrete {
                 ..*state
             },
             local: (asked, ZERO),
-            bears,
+            excess: 0.0,
             by_nonlocal: ZERO,
             crack_width: 0.0,
             crack_normal: SOUND.axes[0],
@@ -514,6 +526,7 @@ impl Concrete {
         kappa: [f64; 3],
         bands: [f64; 3],
         step: &Step,
+        growth: Option<f64>,
     ) -> Response {
         let (p, e) = (&self.properties, self.elastic.modulus);
         let Point { clock, state, axes, laws, .. } = point;
@@ -529,15 +542,22 @@ impl Concrete {
         let pressing =
             Principal { values: principal.values.map(|s| s.min(0.0)), ..principal }.as_stress();
         let pressed =
-            crushing_stress(Principal::of_stress(&tensor::add(&pressing, &found.share)).values) / e;
+            crushing_stress(tensor::principals(&tensor::add(&pressing, &found.share))) / e;
         let weaker = match self.setting.transverse {
             true => softened(found, axes, &principal.directions[2]),
             false => 1.0,
         };
-        let pressed = state.kappa[1].max(pressed / weaker);
-        let damage = state.damage[1].max(compression.damage(pressed).0);
+        let pressed = pressed / weaker;
+        let crushed_by = match growth {
+            Some(share) => {
+                let from = state.kappa[1].max(compression.threshold);
+                state.kappa[1].max(from + share * (state.pressed - from))
+            }
+            None => state.kappa[1].max(pressed),
+        };
+        let damage = state.damage[1].max(compression.damage(crushed_by).0);
         let (stress, tangent) =
-            crushed(&principal, &tensor::rotate_tangent(&found.cracked.tangent, axes), damage);
+            crushed(&principal, &found.cracked.tangent, axes, damage);
         let largest = |values: [f64; 3]| values.into_iter().fold(0.0, f64::max);
         let fixed = state.planes.fixed || (0..3).any(|i| kappa[i] > laws[i].knee());
         let most = |of: &dyn Fn(usize) -> f64| {
@@ -555,10 +575,11 @@ impl Concrete {
                     .increment
                     .advance(&state.history, &tensor::sub(&found.drive, &state.drive)),
                 drive: found.drive,
-                kappa: [largest(kappa), pressed],
+                kappa: [largest(kappa), crushed_by],
+                pressed,
                 bands: [
                     if largest(kappa) > 0.0 { bands[widest] } else { 0.0 },
-                    if pressed > compression.peak { band } else { 0.0 },
+                    if crushed_by > compression.peak { band } else { 0.0 },
                 ],
                 damage: [largest(found.damage), damage],
                 thermal: clock.thermal,
@@ -577,7 +598,9 @@ impl Concrete {
                 ..**state
             },
             local: (found.asked[worst], ZERO),
-            bears: bears[worst],
+            excess: (found.asked[worst] / bears[worst])
+                .max(pressed / crushed_by.max(compression.threshold))
+                - 1.0,
             by_nonlocal: ZERO,
             crack_width: found.cracked.opening[widest] * bands[widest],
             crack_normal: axes[widest],

@@ -123,6 +123,8 @@ pub struct State {
     pub drive: Voigt,
     /// Largest equivalent strain of tension and of compression.
     pub kappa: [f64; 2],
+    /// Equivalent strain of compression that it was asked for last ([`Cracks::Planes`]).
+    pub pressed: f64,
     /// How far the element reaches across the crack, and along what crushed it, when either began,
     /// m; 0: not yet.
     pub bands: [f64; 2],
@@ -198,9 +200,9 @@ pub(crate) struct Response {
     pub state: State,
     /// Local equivalent strain of tension, and its derivative by the strain (exact without creep).
     pub local: Equivalent,
-    /// Equivalent strain that damage of tension stands for, or that of the strength where there is
-    /// none.
-    pub bears: f64,
+    /// By what share the strain it is asked for is beyond what its damage, or its strength, can
+    /// carry; at most zero (to rounding) where damage is found.
+    pub excess: f64,
     /// ∂σ/∂(non-local equivalent strain), Pa; zero while damage does not grow and for the local
     /// law.
     pub by_nonlocal: Voigt,
@@ -271,6 +273,7 @@ impl Concrete {
             history: History::default(),
             drive: ZERO,
             kappa: [0.0; 2],
+            pressed: 0.0,
             bands: [0.0; 2],
             damage: [0.0; 2],
             thermal: 0.0,
@@ -425,6 +428,7 @@ impl Concrete {
             history: clock.increment.advance(&state.history, &tensor::sub(&drive, &state.drive)),
             drive,
             kappa,
+            pressed: kappa[1],
             bands: reached.bands,
             damage,
             thermal: clock.thermal,
@@ -442,7 +446,7 @@ impl Concrete {
                 found.local.0,
                 tensor::scale(&self.elastic.by_strain(split, found.local.1), clock.stiffening),
             ),
-            bears: kappa[0].max(tension.threshold),
+            excess: nonlocal.unwrap_or(found.local.0) / kappa[0].max(tension.threshold) - 1.0,
             by_nonlocal: tensor::scale(&self.elastic.by_tension(split), slope),
             // Principal strains come largest first, and stresses in the same order.
             crack_width: opening[0]

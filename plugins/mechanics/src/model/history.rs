@@ -24,10 +24,10 @@ pub struct History {
     pub(crate) modes: Vec<Modes>,
     /// One a brick.
     pub points: Vec<Memory>,
-    /// Displacements in which an element was born, for those that were born after the beginning:
     /// Of bricks that are damaged the strain of their points that goes on beside what they are
     /// displaced by: that of their modes when they were first damaged.
     pub(crate) softened: BTreeMap<u32, [Voigt; 8]>,
+    /// Displacements in which an element was born, for those that were born after the beginning:
     /// they are its natural shape. By number in the order of elements: bricks first.
     pub born: BTreeMap<u32, [f64; 24]>,
     /// By bar or tendon, and piece.

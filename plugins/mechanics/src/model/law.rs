@@ -285,7 +285,7 @@ impl Law {
                 let record = Record {
                     state: response.state,
                     strained,
-                    excess: (strained / response.bears - 1.0).max(0.0),
+                    excess: response.excess.max(0.0),
                 };
                 Answer {
                     stress: response.stress,

@@ -123,12 +123,14 @@ pub struct Step {
 /// factor of some .07 an iteration, most of which the acceleration takes back.
 const HOLD: f64 = 0.01;
 /// Part of a step from which on cracks that jump are followed one by one.
-const JUMP: f64 = 0.25;
+const JUMP: f64 = 1.0;
 /// By so much the most excessive strain may outgrow its damage between two equilibria of an
 /// avalanche: all others grow in proportion.
-const GROWTH: f64 = 0.5;
+const GROWTH: f64 = 1.0;
 /// Excess below which the iteration is tried again.
 const CALM: f64 = 0.1;
+/// Excess at which given damage is what would be found.
+const SETTLED: f64 = 0.01;
 /// [`Goal::patience`] of a first attempt, which an avalanche can replace.
 const PATIENCE: usize = 6;
 /// Tolerance of equilibria with given damage, which are but a way.
@@ -424,10 +426,14 @@ impl Way<'_, '_> {
             Err(why) => return Ok(Err(why)),
         };
         let (mut calm, mut why) = (CALM, Unbalanced { residual: f64::INFINITY, worst: 0 });
+        let found = Goal { amount: 0.0, growth: None, patience: PATIENCE, ..*goal };
         for equilibria in 1..=COLLAPSE {
             let excess = history.excess();
+            if excess < SETTLED {
+                return Ok(Ok((history, Step { avalanche: equilibria, ..step })));
+            }
             if excess < calm {
-                match self.attempt(&history, &Goal { amount: 0.0, growth: None, ..passed }, job)? {
+                match self.attempt(&history, &found, job)? {
                     Ok((history, last)) => {
                         let linear = step.linear + last.linear;
                         return Ok(Ok((history, Step { linear, avalanche: equilibria, ..last })));
@@ -437,7 +443,10 @@ impl Way<'_, '_> {
             }
             let grown = Goal { amount: 0.0, growth: Some((GROWTH / excess).min(1.0)), ..passed };
             match self.attempt(&history, &grown, job)? {
-                Ok((found, one)) => (history, step.linear) = (found, step.linear + one.linear),
+                Ok((found, one)) => {
+                    history = found;
+                    step = Step { linear: step.linear + one.linear, ..one };
+                }
                 Err(why) => return Ok(Err(why)),
             }
         }
