@@ -16,8 +16,9 @@ use intrados_stage::{
 
 use crate::{
     Action, Actions, Log, Look, Quantity,
-    fields::{self, Fields},
+    fields::{self, Fields, Painted},
     lang::{fixed, local, term},
+    legend::{Legend, put_under},
     number::significant,
     picture,
 };
@@ -94,6 +95,7 @@ pub(crate) fn sheet(
         {
             export.shown = false;
             export.task = Some(save(
+                ui,
                 &mut jobs,
                 &render,
                 &look,
@@ -109,6 +111,7 @@ pub(crate) fn sheet(
 }
 
 fn save(
+    ui: &Ui,
     jobs: &mut Jobs,
     render: &Render,
     look: &Look,
@@ -137,16 +140,30 @@ fn save(
                     0..render.camera().height as usize,
                 )
             };
-            let pixels = painted.map_or_else(film, |painted| painted.image.clone());
+            let image = painted.map_or_else(film, |painted| painted.image.clone());
+            let legend = legend(look, painted).map(|legend| legend.drawn(ui, image.width()));
             let done = format!(
                 "{}: {}",
                 path.display(),
                 describe(render, look, painted.map(|painted| painted.scale.range))
             );
             Task::spawn(jobs, label, move |_| {
-                write_png(&pixels, &path).map(|()| done).map_err(|e| e.to_string())
+                let image = match &legend {
+                    Some(legend) => put_under(&image, legend),
+                    None => image,
+                };
+                write_png(&image, &path).map(|()| done).map_err(|e| e.to_string())
             })
         }
+    }
+}
+
+/// What goes under the picture, where it is in false colour.
+fn legend(look: &Look, painted: Option<&Painted>) -> Option<Legend> {
+    match look.quantity {
+        Quantity::Radiance => None,
+        Quantity::Error => Some(picture::error_legend(look)),
+        Quantity::Field(side) => painted.map(|painted| painted.legend(side)),
     }
 }
 

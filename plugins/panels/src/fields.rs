@@ -16,7 +16,10 @@ use intrados_stage::{Jobs, Task, aside};
 use intrados_transport::Side;
 use rayon::prelude::*;
 
-use crate::{Colours, Look, Quantity, colours, orbit, scale::Ranges};
+use crate::{
+    Colours, Look, Quantity, colours, lang::term, legend::Legend, number::significant, orbit,
+    scale::Ranges,
+};
 
 /// Pixels of a picture of a field, however small the camera's own are.
 const PIXELS: u32 = 200_000;
@@ -42,6 +45,14 @@ pub(crate) struct Painted {
     pub(crate) image: ColorImage,
     /// How they became colours.
     pub(crate) scale: FalseColour,
+}
+
+impl Painted {
+    /// What its colours mean, for a file; `side`: of which field it is.
+    pub(crate) fn legend(&self, side: Side) -> Legend {
+        let lines = vec![term(name(side)), caption(side)];
+        Legend::new(&self.scale, |value| self.scale.encode(value), written, lines)
+    }
 }
 
 impl Fields {
@@ -114,6 +125,17 @@ pub(crate) fn meaning(side: Side) -> [&'static str; 2] {
         Side::Primal => ["light that arrives at the surface by flights", "W/m²"],
         Side::Dual => ["importance for the picture that arrives at the surface by flights", "1/m²"],
     }
+}
+
+/// What the legend of such a picture is of.
+pub(crate) fn caption(side: Side) -> String {
+    let [what, unit] = meaning(side);
+    tr!("{}, {} (logarithmic)", term(what), unit)
+}
+
+/// A value in that legend.
+pub(crate) fn written(value: f32) -> String {
+    significant(f64::from(value), 2)
 }
 
 /// Paints the fields off the frame as soon as somebody wants to see them.

@@ -103,15 +103,41 @@ pub(crate) fn say(text: &str, values: &[&dyn Display]) -> String {
 /// values in it is found by the term that has `{}` for them, and they are terms again. As it is,
 /// where it has no translation.
 pub(crate) fn term(text: &str) -> String {
+    found(text, str::to_owned)
+}
+
+/// A term that says what was measured or computed, with its numbers as the language writes them.
+/// Not for what somebody is told to write into a file: there, numbers have a point.
+pub(crate) fn measured(text: &str) -> String {
+    found(text, numbers)
+}
+
+/// See [`term`]; what has no translation is said by `other`.
+fn found(text: &str, other: fn(&str) -> String) -> String {
     let Some(column) = column() else { return text.to_owned() };
     if let Some(said) = words().get(text) {
         return said[column].clone();
     }
-    let found = patterns().iter().find_map(|pattern| Some((pattern, values(pattern, text)?)));
-    let Some((pattern, values)) = found else { return text.to_owned() };
-    let values: Vec<String> = values.into_iter().map(term).collect();
+    let pattern = patterns().iter().find_map(|pattern| Some((pattern, values(pattern, text)?)));
+    let Some((pattern, values)) = pattern else { return other(text) };
+    let values: Vec<String> = values.into_iter().map(|value| found(value, other)).collect();
     let values: Vec<&dyn Display> = values.iter().map(|v| v as &dyn Display).collect();
     filled(translated(pattern), &values)
+}
+
+/// A text as code has it, with its numbers as the language writes them: words that are nothing but
+/// a number. Dates, versions and names of files are none.
+fn numbers(text: &str) -> String {
+    let ends = |c: char| c.is_whitespace() || "()[]±×–…,;:%°".contains(c);
+    let said = |piece: &str| {
+        let word = piece.trim_end_matches(ends);
+        let number = word.strip_suffix('.').unwrap_or(word);
+        match number.parse::<f64>() {
+            Ok(_) => local(number.to_owned()) + &piece[number.len()..],
+            Err(_) => piece.to_owned(),
+        }
+    };
+    text.split_inclusive(ends).map(said).collect()
 }
 
 /// What an engine says, several lines of it.
@@ -322,6 +348,23 @@ mod tests {
         speak(Language::English);
         assert_eq!(said, "Schnittbild 3 von 10 wird ausgewertet");
         assert_eq!(term("a name | of another"), "a name | of another");
+    }
+
+    #[test]
+    fn what_was_measured_has_numbers_as_the_language_writes_them() {
+        speak(Language::German);
+        assert_eq!(measured("0.4 ± 0.05 mm, along"), "0,4 ± 0,05 mm, längs");
+        assert_eq!(measured("0.2 of 1.5 m² hollow"), "0,2 von 1,5 m² hohl");
+        assert_eq!(measured("31.5 kN + 2.25 kN/m"), "31,5 kN + 2,25 kN/m");
+        assert_eq!(numbers("(-1.5e-3 × 0.5) to 0.2."), "(-1,5e-3 × 0,5) to 0,2.");
+        for name in ["wall_0.5.png", "2026-05-03, 7.3.4", "C30/37 and B2.1"] {
+            assert_eq!(measured(name), name);
+        }
+        assert_eq!(term("0.2 m²"), "0.2 m²");
+        speak(Language::Chinese);
+        assert_eq!(measured("0.4 ± 0.05 mm, along"), "0.4 ± 0.05 mm，纵向");
+        speak(Language::English);
+        assert_eq!(measured("0.4 ± 0.05 mm, along"), "0.4 ± 0.05 mm, along");
     }
 
     #[test]

@@ -22,6 +22,7 @@ mod history;
 mod inspector;
 mod kept;
 mod layout;
+mod legend;
 mod log;
 mod members;
 mod meters;

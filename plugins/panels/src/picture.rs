@@ -12,7 +12,7 @@ use intrados_light::{
 use intrados_transport::Side;
 use rayon::prelude::*;
 
-use crate::{Colours, Statistics, Viewpoint, colours};
+use crate::{Colours, Statistics, Viewpoint, colours, lang::local, legend::Legend};
 
 /// A large film is developed in so many bands of rows, one a frame: all of it at once would take
 /// half a frame.
@@ -309,6 +309,22 @@ pub(crate) fn pixels(
 /// The scale of relative errors.
 pub(crate) fn error_scale(look: &Look) -> FalseColour {
     look.colours.over(ERRORS, true)
+}
+
+/// What the legend of relative errors is of.
+pub(crate) fn error_caption() -> String {
+    tr!("relative standard error of a pixel (logarithmic)")
+}
+
+/// A relative error in that legend.
+pub(crate) fn error_share(error: f32) -> String {
+    local(format!("{} %", 100.0 * error))
+}
+
+/// The same legend, for a file.
+pub(crate) fn error_legend(look: &Look) -> Legend {
+    let scale = error_scale(look);
+    Legend::new(&scale, |error| scale.encode(error), error_share, vec![error_caption()])
 }
 
 fn error_colour(scale: &FalseColour, value: Option<(Vec3, Vec3)>) -> Color32 {

@@ -13,8 +13,8 @@ use intrados_transport::Side;
 use crate::{
     Action, Actions, Look, Quantity, Refine, Selection, Statistics, Viewpoint,
     fields::{self, Fields},
-    lang::{drag, fixed, local, slide, term},
-    number::{count, duration, percent, plus_minus, significant},
+    lang::{drag, fixed, slide, term},
+    number::{count, duration, percent, plus_minus},
     orbit,
     outline::Outline,
     picture::{self, Cursor, Picture, Under},
@@ -116,16 +116,13 @@ pub(crate) fn render(
     match look.quantity {
         Quantity::Radiance => reference.figures(ui, below),
         Quantity::Error => {
-            let caption = tr!("relative standard error of a pixel (logarithmic)");
-            let share = |error: f32| local(format!("{} %", 100.0 * error));
-            scale::legend(ui, below, &picture::error_scale(&look), share, &caption);
+            let (scale, caption) = (picture::error_scale(&look), picture::error_caption());
+            scale::legend(ui, below, &scale, picture::error_share, &caption);
         }
         Quantity::Field(side) => {
             if let Some(painted) = fields.painted(side) {
-                let [what, unit] = fields::meaning(side);
-                let caption = tr!("{}, {} (logarithmic)", term(what), unit);
-                let number = |value: f32| significant(f64::from(value), 2);
-                scale::legend(ui, below, &painted.scale, number, &caption);
+                let caption = fields::caption(side);
+                scale::legend(ui, below, &painted.scale, fields::written, &caption);
             }
         }
     }

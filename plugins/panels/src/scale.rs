@@ -200,7 +200,7 @@ pub(crate) fn legend(
 }
 
 /// The ends of a logarithmic range and round numbers between, with their places on it.
-fn marks([low, high]: [f32; 2]) -> Vec<(f32, egui::Align2, f32)> {
+pub(crate) fn marks([low, high]: [f32; 2]) -> Vec<(f32, egui::Align2, f32)> {
     let mut marks = vec![(0.0, egui::Align2::LEFT_TOP, low), (1.0, egui::Align2::RIGHT_TOP, high)];
     let decades = (high / low).log10();
     let steps: &[f32] = if decades < 2.0 { &[1.0, 2.0, 5.0] } else { &[1.0] };

@@ -1,4 +1,5 @@
-//! Colours of numbers: one map for the whole window, bands, and ranges that are locked.
+//! Colours of numbers: one map for the whole window, bands, ranges that are locked, and legends under
+//! pictures that are saved.
 
 use std::{collections::BTreeSet, path::Path};
 
@@ -8,10 +9,10 @@ use intrados_light::{
     tone::{ABOVE, BELOW, ColourMap},
 };
 use intrados_mechanics::plugin::Analyses;
-use intrados_panels::{Action, Colours, Look, PanelsPlugin, Quantity, Viewpoint, Workspace};
+use intrados_panels::{Action, Colours, Log, Look, PanelsPlugin, Quantity, Viewpoint, Workspace};
 use intrados_stage::Work;
 
-use super::{Window, stress_of};
+use super::{Window, export, stress_of, type_into};
 
 /// All colours that are seen somewhere.
 fn seen(window: &Window) -> BTreeSet<[u8; 3]> {
@@ -97,4 +98,60 @@ fn a_locked_range_has_colours_for_what_lies_beyond() {
     window.click("Lock the range");
     window.frames(2);
     assert_eq!(clipped(&window), [false; 2]);
+}
+
+/// All colours beneath the first rows of a picture that was saved.
+fn beneath(file: &Path, rows: u32) -> BTreeSet<[u8; 3]> {
+    let picture = image::open(file).expect("a picture").into_rgb8();
+    assert!(picture.height() > rows, "nothing is under the picture");
+    picture.enumerate_pixels().filter(|(_, y, _)| *y >= rows).map(|(_, _, p)| p.0).collect()
+}
+
+/// A picture in false colour that is saved has its legend under it; one of light needs none.
+#[test]
+fn a_saved_picture_of_errors_says_what_its_colours_mean() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut window = with_errors(&folder.path().join("layout.json"));
+    let [errors, light] = ["errors.png", "light.png"].map(|name| folder.path().join(name));
+    export(&mut window, &errors);
+    let rows = window.with(|w| w.resource::<Render>().camera().height);
+    let legend = beneath(&errors, rows);
+    assert!(has(&legend, ColourMap::Viridis, 64), "{} colours", legend.len());
+    assert!(legend.contains(&ColourMap::Viridis.unknown()));
+    window.ask(Action::ShowQuantity(Quantity::Radiance));
+    window.frames(3);
+    export(&mut window, &light);
+    assert_eq!(image::image_dimensions(&light).expect("a picture").1, rows);
+}
+
+/// The legend under a picture of stress has a scale of colours, and names those of what lies beyond
+/// a range that is locked.
+#[test]
+fn a_saved_picture_of_stress_says_what_its_colours_mean() {
+    let mut window = Window::with_scene("column");
+    stress_of(&mut window, 0, 0.2);
+    window.until("an outcome", |w| {
+        w.resource::<Analyses>().get("C1").is_some_and(|a| matches!(a.work, Work::Done(_)))
+    });
+    window.frames(4);
+    let folder = tempfile::tempdir().expect("a folder");
+    let saved = |window: &mut Window, name: &str| {
+        let file = folder.path().join(name);
+        let rect = window.harness.get_by_label_contains("Stress: Largest principal").rect();
+        type_into(window, "Save as", &file.display().to_string());
+        window.click("Save picture or table");
+        window.until("the picture", |w| {
+            let lines = w.resource::<Log>().lines();
+            lines.iter().any(|line| line.starts_with("wrote") && line.contains(name))
+        });
+        beneath(&file, rect.height().ceil() as u32)
+    };
+    let beyond = |seen: &BTreeSet<[u8; 3]>| [BELOW, ABOVE].map(|c| seen.contains(&c));
+    let is_grey = |c: &&[u8; 3]| c.iter().max().zip(c.iter().min()).is_none_or(|(a, b)| a - b < 30);
+    let free = saved(&mut window, "free.png");
+    assert!(free.iter().filter(|c| !is_grey(c)).count() > 15, "{free:?}");
+    assert_eq!(beyond(&free), [false; 2]);
+    window.click("Lock the range");
+    window.frames(4);
+    assert_eq!(beyond(&saved(&mut window, "locked.png")), [true; 2]);
 }

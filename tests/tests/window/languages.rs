@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use egui::epaint::text::MissingGlyphPolicy;
-use egui_kittest::kittest::NodeT;
+use egui_kittest::kittest::{NodeT, Queryable};
 use intrados_panels::{Action, Language, Taken, Workspace};
 
 use super::{Window, pictures::at_rest};
@@ -90,4 +90,17 @@ fn nothing_is_left_in_english() {
             .collect();
         assert!(left.is_empty(), "{}: {left:#?}", language.name());
     }
+}
+
+/// Values of evidence have the comma of the language.
+#[test]
+fn values_of_evidence_are_written_as_the_language_writes_numbers() {
+    let (mut window, _folder) = at_rest();
+    let says = |window: &Window, text: &str| {
+        window.harness.query_all_by_label_contains(text).next().is_some()
+    };
+    assert!(says(&window, "0.4 ± ") && !says(&window, "0,4 ± "));
+    window.ask(Action::Speak(Language::German));
+    window.frames(4);
+    assert!(says(&window, "0,4 ± ") && !says(&window, "0.4 ± "));
 }

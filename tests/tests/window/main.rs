@@ -820,6 +820,9 @@ fn fields_are_shown_and_a_camera_move_forgets_them() {
         assert!(window.harness.query_by_label(&picture).is_some(), "no picture of the {name}");
         let file = folder.path().join(format!("{name}.png"));
         export(&mut window, &file);
+        let camera = window.with(|w| w.resource::<Render>().camera().clone());
+        let (width, height) = image::image_dimensions(&file).expect("a picture");
+        assert!(height > width * camera.height / camera.width + 30, "no legend is under it");
         std::fs::read(file).expect("written")
     });
     assert!(

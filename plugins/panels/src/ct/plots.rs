@@ -150,6 +150,47 @@ fn sorted(pores: &[Pore], order: Order) -> Vec<usize> {
     list
 }
 
+/// Least room between two columns, and room after the last one, points.
+const GAPS: [f32; 2] = [5.0, 6.0];
+
+/// The heads of columns: what they are called, and an arrow at the one that sorts.
+fn heads(columns: usize, order: Order) -> Vec<String> {
+    let arrow = |k: usize| match (order.column == k, order.falling) {
+        (false, _) => "",
+        (true, true) => " ⏷",
+        (true, false) => " ⏶",
+    };
+    let names = COLUMNS.iter().take(columns).enumerate();
+    names.map(|(k, (name, ..))| term(name) + arrow(k)).collect()
+}
+
+/// Where columns end that are so wide, in a table of this width: what is left over goes between
+/// them. Where there is too little, the last ones stick out: texts never run into each other.
+fn ends(widths: &[f32], table: f32) -> Vec<f32> {
+    let spare = table - GAPS[1] - widths.iter().sum::<f32>();
+    let gap = (spare / widths.len().saturating_sub(1).max(1) as f32).max(GAPS[0]);
+    let mut next = 0.0_f32;
+    let end = |width: &f32| {
+        let end = next + width;
+        next = end + gap;
+        end
+    };
+    widths.iter().map(end).collect()
+}
+
+/// The same for columns with these heads.
+fn ends_of(ui: &Ui, heads: &[String], table: f32) -> Vec<f32> {
+    let font = egui::TextStyle::Small.resolve(ui.style());
+    let wide = |text: &str| {
+        let text = ui.painter().layout_no_wrap(text.to_owned(), font.clone(), Color32::PLACEHOLDER);
+        text.size().x
+    };
+    // Most values are no longer than this.
+    let least = wide("0.000");
+    let widths: Vec<f32> = heads.iter().map(|head| wide(head).max(least)).collect();
+    ends(&widths, table)
+}
+
 /// The pores; `picked` is marked, and followed where `follow` says. A click gives the label of the
 /// row.
 pub(super) fn table(
@@ -167,17 +208,19 @@ pub(super) fn table(
     let width = ui.available_width() - 10.0;
     // The last column may be empty throughout.
     let columns = if pores.iter().any(|p| p.bar_mm.is_some()) { 6 } else { 5 };
-    let cell = width / columns as f32;
+    let heads = heads(columns, *order);
+    let ends = ends_of(ui, &heads, width);
     let font = egui::TextStyle::Small.resolve(ui.style());
     let write = |ui: &Ui, rect: egui::Rect, column: usize, text: String, colour: Color32| {
-        let at = egui::pos2(rect.left() + cell * (column as f32 + 1.0) - 6.0, rect.center().y);
+        let at = egui::pos2(rect.left() + ends[column], rect.center().y);
         ui.painter().text(at, egui::Align2::RIGHT_CENTER, text, font.clone(), colour);
     };
     let (head, _) = ui.allocate_exact_size(vec2(width, row), Sense::hover());
-    for (k, (name, what, _)) in COLUMNS[..columns].iter().enumerate() {
+    let mut left = head.left();
+    for (k, ((name, what, _), text)) in COLUMNS.iter().zip(heads).enumerate() {
         let name = term(name);
-        let rect =
-            egui::Rect::from_min_size(head.min + vec2(cell * k as f32, 0.0), vec2(cell, row));
+        let rect = head.with_min_x(left).with_max_x(head.left() + ends[k]);
+        left = rect.right();
         let response = ui
             .interact(rect, ui.scope_id().with(("order", k)), Sense::click())
             .on_hover_text(term(what));
@@ -187,12 +230,7 @@ pub(super) fn table(
         if response.clicked() {
             *order = Order { column: k, falling: order.column != k || !order.falling };
         }
-        let arrow = match (order.column == k, order.falling) {
-            (false, _) => "",
-            (true, true) => " ⏷",
-            (true, false) => " ⏶",
-        };
-        write(ui, head, k, format!("{name}{arrow}"), ui.visuals().strong_text_color());
+        write(ui, head, k, text, ui.visuals().strong_text_color());
     }
     let list = sorted(pores, *order);
     let mut area = ScrollArea::vertical().auto_shrink(false).id_salt("pores");
@@ -243,6 +281,31 @@ pub(super) fn table(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn columns_share_what_is_left_over_and_never_touch() {
+        let widths = [40.0, 30.0, 50.0];
+        assert_eq!(ends(&widths, 166.0), [40.0, 90.0, 160.0]);
+        assert_eq!(ends(&widths, 60.0), [40.0, 75.0, 130.0]);
+        assert_eq!(ends(&[40.0], 20.0), [40.0]);
+    }
+
+    /// Beside a picture, in small print as large as the window's.
+    #[test]
+    fn all_heads_have_room_beside_a_picture() {
+        let heads = heads(COLUMNS.len(), Order::default());
+        let mut found = Vec::new();
+        let mut output = egui::Context::default().run_ui(egui::RawInput::default(), |ui| {
+            let small = egui::FontId::proportional(12.0);
+            ui.style_mut().text_styles.insert(egui::TextStyle::Small, small);
+            found = ends_of(ui, &heads, super::super::ASIDE - 10.0);
+        });
+        output.textures_delta.clear();
+        assert!(
+            found.is_sorted() && found.last() <= Some(&(super::super::ASIDE - 16.0 + 0.01)),
+            "{found:?}"
+        );
+    }
 
     #[test]
     fn tables_are_sorted_and_what_is_unknown_comes_last() {

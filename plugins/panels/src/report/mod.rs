@@ -13,7 +13,7 @@ use intrados_stage::Jobs;
 
 use crate::{
     Action, Actions, Latest, Selection, colours,
-    lang::{fixed, term},
+    lang::{fixed, measured, term},
     members::progress,
     number::{percent, plus_minus},
 };
@@ -115,7 +115,7 @@ fn ledger(ui: &mut Ui, result: &Prediction) {
             ui.label(term(&group.name()));
             ui.label(match &first.why {
                 None => tr!("used"),
-                Some(why) => tr!("⚠ not used, because {}", term(why)),
+                Some(why) => tr!("⚠ not used, because {}", measured(why)),
             });
             ui.end_row();
         }
@@ -153,7 +153,7 @@ fn row(
         .values()
         .map(|e| format!("{} {}", term(called(e.source)), plus_minus(e.damage, e.std_error, "")))
         .collect();
-    let basis: Vec<String> = member.evidence.values().map(|e| term(&e.basis)).collect();
+    let basis: Vec<String> = member.evidence.values().map(|e| measured(&e.basis)).collect();
     let conflict = if member.conflict { "⚠ " } else { "" };
     ui.add(egui::Label::new(format!("{conflict}{}", said.join(", "))).extend())
         .on_hover_text(basis.join("\n"));

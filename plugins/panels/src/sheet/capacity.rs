@@ -16,7 +16,7 @@ use intrados_stage::Work;
 
 use crate::{
     Action, Actions,
-    lang::{fixed, local, term},
+    lang::{fixed, local, measured, term},
     number::copied,
 };
 
@@ -54,7 +54,7 @@ pub(super) fn capacity(
             Mode::None => tr!("It bears at least {} times {}.", times, loads),
             mode => tr!("It bears {} times {} (fails by {}).", times, loads, term(mode.words())),
         };
-        ui.label(bears).on_hover_text(term(&c.because));
+        ui.label(bears).on_hover_text(measured(&c.because));
         let [cost, error] = [c.cost.value, c.cost.std_error].map(|share| 100.0 * share);
         if cost > 0.0 || error > 0.0 {
             let [cost, error] = [cost, error].map(|percent| fixed(percent, 0));
@@ -196,13 +196,13 @@ fn bears(ui: &mut Ui, strength: &Strength) {
         fixed(1e3 * peak.displacement_m, 1)
     );
     copied(ui, RichText::new(text).strong());
-    ui.label(tr!("and fails by {}: {}", term(strength.mode.words()), term(&strength.because)));
+    ui.label(tr!("and fails by {}: {}", term(strength.mode.words()), measured(&strength.because)));
     if let Some(yields) = &strength.yielding {
         ui.label(tr!("A bar yields first at {} × what acts.", fixed(yields.load_factor, 2)));
     }
     ui.weak(tr!(
         "Raised: {}. Followed until {}.",
         strength.loads.join(", "),
-        term(&strength.ended)
+        measured(&strength.ended)
     ));
 }

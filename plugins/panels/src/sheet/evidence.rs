@@ -13,7 +13,7 @@ use intrados_scene::{
 
 use crate::{
     Action, Actions,
-    lang::{fixed, term},
+    lang::{fixed, measured, term},
 };
 
 /// Rows shown at first.
@@ -69,7 +69,7 @@ impl Listing {
             let source = term(called(first.source));
             let verdict = match &first.why {
                 None => tr!("used"),
-                Some(why) => tr!("not used, because {}", term(why)),
+                Some(why) => tr!("not used, because {}", measured(why)),
             };
             ui.label(format!("{mark} {source}, {}: {verdict}", term(&group.name())));
         }
@@ -88,9 +88,14 @@ fn row(ui: &mut Ui, one: &Listed, actions: &mut Actions) {
         let undated = || format!("{:10}", tr!("undated"));
         ui.monospace(one.date.map_or_else(undated, |d| d.to_string()));
         ui.strong(term(one.kind));
-        ui.label(term(&one.value)).on_hover_text(&one.name);
+        ui.label(value(one)).on_hover_text(&one.name);
         ui.weak(place(one));
     });
+}
+
+/// How much, for people. A photograph has the name of its file there.
+fn value(one: &Listed) -> String {
+    if one.kind == "photograph" { one.value.clone() } else { measured(&one.value) }
 }
 
 /// Where on the member, for people.

@@ -8,7 +8,7 @@ use intrados_survey::photographed::FaceSeen;
 
 use crate::{
     colours,
-    lang::{fixed, local, term},
+    lang::{fixed, local, measured, term},
 };
 
 /// Height of the map, points.
@@ -85,7 +85,7 @@ fn row(ui: &mut Ui, number: usize, defect: &Defect) {
         ui.weak(format!("{}, {when}", term(called(defect.source))));
     });
     if let Some(change) = defect.change() {
-        ui.weak(term(&change));
+        ui.weak(measured(&change));
     }
     if let Some(picture) = &defect.picture {
         thumbnail(ui, number, picture);
@@ -107,7 +107,7 @@ fn thumbnail(ui: &mut Ui, number: usize, picture: &intrados_ct::Picture) {
     });
     let size = texture.size_vec2();
     let scale = (ui.available_width().min(220.0) / size.x).min(120.0 / size.y).min(1.0);
-    ui.image((texture.id(), scale * size)).on_hover_text(term(&picture.caption));
+    ui.image((texture.id(), scale * size)).on_hover_text(measured(&picture.caption));
 }
 
 /// The surface laid flat. What has no side lies in a row of its own beneath.
@@ -182,5 +182,27 @@ fn frame(ui: &Ui, area: Rect, length: f64) {
             _ => Align2::CENTER_TOP,
         };
         painter.text(at, align, text, font.clone(), weak);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Language, lang::speak};
+
+    /// The command line has its own sentence, in English: nothing of it may be missing here.
+    #[test]
+    fn photographs_are_said_as_the_command_line_says_them() {
+        let of =
+            |face: &str, seen, narrowest_mm| FaceSeen { face: face.into(), seen, narrowest_mm };
+        let faces = [of("Front", 0.93, Some(0.24)), of("Left", 0.5, None), of("Back", 0.0, None)];
+        assert_eq!(photographed(&faces), FaceSeen::told(&faces));
+        speak(Language::German);
+        let said = photographed(&faces);
+        speak(Language::English);
+        for part in ["93 %", "Vorderseite", "0,24 mm", "50 %", "Rückseite"] {
+            assert!(said.contains(part), "{part}: {said}");
+        }
+        assert!(!said.contains("cracks") && !said.contains("nothing"), "{said}");
     }
 }

@@ -22,7 +22,7 @@ use capacity::Mechanics;
 use crate::{
     Action, Actions, Latest, Selection, colours,
     history::History,
-    lang::{fixed, term},
+    lang::{fixed, measured, term},
     moment::{Course, Courses, Moment},
     number::{copied, plus_minus},
 };
@@ -203,10 +203,10 @@ fn sources(ui: &mut Ui, told: &MemberPrediction) {
             ui.strong(term(called(source)));
             copied(ui, RichText::new(format!("d = {}", plus_minus(e.damage, e.std_error, ""))));
         });
-        ui.label(term(&e.basis));
+        ui.label(measured(&e.basis));
     }
     for conflict in &told.conflicts {
-        ui.label(tr!("⚠ contradicting: {}", term(conflict)));
+        ui.label(tr!("⚠ contradicting: {}", measured(conflict)));
     }
 }
 
@@ -235,7 +235,7 @@ fn foretold(ui: &mut Ui, told: &MemberPrediction, course: Option<&Course>, momen
     };
     let value = plus_minus(forecast.damage, forecast.std_error, "");
     copied(ui, RichText::new(format!("d = {}", value.trim())));
-    ui.label(term(&forecast.basis));
+    ui.label(measured(&forecast.basis));
     if let Some(course) = course {
         life(ui, course, moment);
     }

@@ -30,6 +30,7 @@ use quantity::Quantity;
 use crate::{
     Actions, Colours, Log, Look, Selection, colours,
     lang::{drag, fixed, lines, local, slide, term},
+    legend::Legend,
     members,
     number::significant,
     scale::{self, Ranges},
@@ -117,6 +118,16 @@ struct Shown {
     positions: Vec<Vec3>,
     values: Vec<f32>,
     scale: FalseColour,
+}
+
+impl Shown {
+    /// The least and the largest value of what is seen.
+    fn extremes(&self) -> Option<[f32; 2]> {
+        let values = self.faces.iter().flatten().filter_map(|v| self.values.get(*v as usize));
+        let [least, most] =
+            values.fold([f32::INFINITY, f32::NEG_INFINITY], |[a, b], v| [a.min(*v), b.max(*v)]);
+        (least <= most).then_some([least, most])
+    }
 }
 
 #[derive(Clone, PartialEq)]
@@ -747,6 +758,18 @@ impl View<'_> {
         )
     }
 
+    /// What its colours mean, for a file.
+    fn legend(&self, quantity: Quantity, shown: &Shown) -> Legend {
+        let scale = &shown.scale;
+        let mut lines = vec![self.caption(quantity, shown)];
+        if let Some(values) = shown.extremes() {
+            let [least, most] = values.map(|value| significant(f64::from(value), 3));
+            lines.push(tr!("linear scale; max {}, min {}", most, least));
+        }
+        let colour = |value| quantity.colour(scale, value);
+        Legend::new(scale, colour, |value| written(value, scale.range), lines)
+    }
+
     fn saving(&self, ui: &mut Ui, stress: &mut Stress, jobs: &mut Jobs) {
         let label = ui.label(tr!("Save as"));
         ui.add(egui::TextEdit::singleline(&mut stress.path).desired_width(200.0))
@@ -770,12 +793,13 @@ impl View<'_> {
                 ),
             };
             let (image, background) = (shown.drawn.image.clone(), ui.visuals().extreme_bg_color);
+            let legend = self.legend(stress.quantity, shown).drawn(ui, image.width());
             let (skin, shot) = (Arc::clone(self.skin), Arc::clone(self.shot));
             stress.task = Some(Task::spawn(
                 jobs,
                 format!("writing {}", path.display()),
                 move |_| match kind {
-                    save::Kind::Picture => save::picture(image, background, &path, &what),
+                    save::Kind::Picture => save::picture(image, background, &legend, &path, &what),
                     save::Kind::Table => save::table(&skin, &shot, &path, &what),
                 },
             ));
@@ -786,12 +810,16 @@ impl View<'_> {
     }
 }
 
+/// A value beside the colours of a range: what is nothing but for rounding is 0.
+fn written(value: f32, [low, high]: [f32; 2]) -> String {
+    if value.abs() < 1e-4 * (high - low) { "0".into() } else { significant(f64::from(value), 3) }
+}
+
 /// Colours with their values, and the true extremes.
 fn legend(ui: &Ui, rect: Rect, quantity: Quantity, name: &str, shown: &Shown) {
     let painter = ui.painter().with_clip_rect(rect);
     let height = (rect.height() * 0.6).clamp(60.0, 260.0);
     let bar = Rect::from_min_size(pos2(rect.right() - 84.0, rect.top() + 42.0), vec2(14.0, height));
-    let [low, high] = shown.scale.range;
     // The picture may reach under it.
     let behind = Rect::from_min_max(
         pos2(bar.left() - 6.0, rect.top()),
@@ -817,15 +845,10 @@ fn legend(ui: &Ui, rect: Rect, quantity: Quantity, name: &str, shown: &Shown) {
         let value = scale::at(&shown.scale, share);
         let y = bar.bottom() - bar.height() * share;
         painter.hline(bar.right()..=bar.right() + 3.0, y, (1.0, colour));
-        let text = if value.abs() < 1e-4 * (high - low) {
-            "0".into()
-        } else {
-            significant(f64::from(value), 3)
-        };
         painter.text(
             pos2(bar.right() + 6.0, y),
             egui::Align2::LEFT_CENTER,
-            text,
+            written(value, shown.scale.range),
             font.clone(),
             colour,
         );
@@ -841,13 +864,7 @@ fn legend(ui: &Ui, rect: Rect, quantity: Quantity, name: &str, shown: &Shown) {
     };
     right(rect.top() + 6.0, name.into());
     right(rect.top() + 20.0, term(quantity.unit().0));
-    let (least, most) = shown
-        .faces
-        .iter()
-        .flatten()
-        .filter_map(|v| shown.values.get(*v as usize))
-        .fold((f32::INFINITY, f32::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
-    if least <= most {
+    if let Some([least, most]) = shown.extremes() {
         right(bar.bottom() + 10.0, tr!("max {}", significant(f64::from(most), 3)));
         right(bar.bottom() + 24.0, tr!("min {}", significant(f64::from(least), 3)));
     }

@@ -9,12 +9,12 @@ use intrados_mechanics::{
     write::csv,
 };
 
-use crate::{export::write_png, lang::fixed};
+use crate::{export::write_png, lang::fixed, legend::put_under};
 
 /// What is written, by the ending of the file's name.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Kind {
-    /// The picture, as it is.
+    /// The picture, as it is, with its legend.
     Picture,
     /// Every point of the surface at this moment.
     Table,
@@ -30,15 +30,16 @@ impl Kind {
     }
 }
 
-/// Writes the picture on the window's background; `what` says what it shows.
+/// Writes the picture on the window's background, its legend under it; `what` says what it shows.
 pub(super) fn picture(
     mut image: ColorImage,
     background: egui::Color32,
+    legend: &ColorImage,
     path: &Path,
     what: &str,
 ) -> Result<String, String> {
     image.pixels.iter_mut().for_each(|p| *p = background.blend(*p));
-    write_png(&image, path).map_err(|e| e.to_string())?;
+    write_png(&put_under(&image, legend), path).map_err(|e| e.to_string())?;
     Ok(format!("{}: {what}", path.display()))
 }
 
