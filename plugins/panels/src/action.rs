@@ -60,7 +60,8 @@ pub enum Action {
     Frame,
     /// The scene's own camera.
     Home,
-    /// Another camera of the scene, by its place in the list.
+    /// Another camera of the scene, by its place in the list; the structure is looked at from
+    /// there, too.
     Camera(usize),
     /// Look from a view that is kept of the scene, by its place in the list.
     View(usize),
@@ -237,13 +238,7 @@ fn carry_out(world: &mut World, action: Action) {
                 world.resource_mut::<Viewpoint>().go(home);
             }
         }
-        Action::Camera(index) => {
-            let camera =
-                world.get_resource::<CurrentScene>().and_then(|s| s.0.cameras.get(index).cloned());
-            if let Some(camera) = camera {
-                world.resource_mut::<Viewpoint>().go(camera);
-            }
-        }
+        Action::Camera(index) => views::go_to_camera(world, index),
         Action::View(index) => views::go(world, index),
         Action::KeepView(name) => views::keep(world, &name),
         Action::ForgetView(index) => views::forget(world, index),

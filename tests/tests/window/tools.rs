@@ -265,6 +265,32 @@ fn a_kept_view_is_gone_to_and_forgotten() {
     assert!(window.harness.query_by_label("the lamp").is_none(), "it is still listed");
 }
 
+/// A camera of the scene moves the structure's picture as it moves that of light, even while its tab
+/// is behind another one.
+#[test]
+fn a_camera_of_the_scene_moves_both_pictures() {
+    let mut window = Window::with_scene("column");
+    let cameras = window.with(|w| w.resource::<CurrentScene>().0.cameras.clone());
+    window.ask(Action::Camera(1));
+    window.frames(2);
+    window.ask(Action::Tab("Structure"));
+    window.frames(3);
+    window.click("As it looks");
+    window.until("light from the second camera", |w| is_structure_from(w, &cameras[1]));
+    window.ask(Action::Views);
+    window.frames(3);
+    window.click(&cameras[0].name);
+    window.until("light from the first camera", |w| is_structure_from(w, &cameras[0]));
+}
+
+/// Whether the structure is shown in light from there: that is asked for in the pixels of its own
+/// panel.
+fn is_structure_from(world: &World, camera: &Camera) -> bool {
+    let place = |c: &Camera| (c.position, c.target, c.fov_deg);
+    let now = world.resource::<Viewpoint>().camera();
+    now.is_some_and(|now| place(now) == place(camera) && now.width != camera.width)
+}
+
 /// A reference is held against the picture: by its figures, and under a divider that is dragged
 /// instead of the camera; with the camera it goes.
 #[test]
