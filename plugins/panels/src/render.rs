@@ -86,7 +86,7 @@ pub(crate) fn render(
         ui.painter().image(texture.id(), rect, whole, Color32::WHITE);
     }
     if look.quantity == Quantity::Radiance {
-        reference.draw(ui, rect, look.exposure);
+        reference.draw(ui, rect, &look);
     }
     if let Some(texture) = outline.bypass_change_detection().texture(ui.ctx()) {
         ui.painter().image(texture.id(), rect, whole, Color32::WHITE);
@@ -114,7 +114,7 @@ pub(crate) fn render(
         pos2(rect.right(), rect.bottom() + 42.0),
     );
     match look.quantity {
-        Quantity::Radiance => reference.figures(ui, below),
+        Quantity::Radiance => reference.figures(ui, below, &look),
         Quantity::Error => {
             let caption = tr!("relative standard error of a pixel (logarithmic)");
             let share = |error: f32| local(format!("{} %", 100.0 * error));
