@@ -21,6 +21,7 @@ use crate::{
     export::Export,
     history::History,
     layout::Layout,
+    light_line::LightLine,
     photos::Photos,
     play,
     recent::Recent,
@@ -399,8 +400,12 @@ fn dismiss(world: &mut World) {
     {
         return;
     }
-    // A tool over slices that are seen goes before the selection that they are of.
-    if world.resource::<Desk>().place("CT").is_some() && world.resource_mut::<Ct>().end_tool() {
+    // A tool over slices that are seen goes before the selection that they are of, and so does one
+    // over the picture of light.
+    let [slices, light] = ["CT", "Render"].map(|panel| world.resource::<Desk>().has_drawn(panel));
+    if slices && world.resource_mut::<Ct>().end_tool()
+        || light && world.resource_mut::<LightLine>().end()
+    {
         return;
     }
     world.resource_mut::<Selection>().set_if_neq(Selection(None));

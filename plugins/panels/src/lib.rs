@@ -22,6 +22,8 @@ mod history;
 mod inspector;
 mod kept;
 mod layout;
+mod light_line;
+mod line;
 mod log;
 mod members;
 mod meters;

@@ -363,6 +363,41 @@ fn flip_tells_how_different_a_picture_looks_from_its_reference() {
     assert!(map != own && map != difference);
 }
 
+/// A line over the picture of light is a plot with its length, and a table with standard errors;
+/// the camera stays where it is. Escape puts the tool away.
+#[test]
+fn a_line_over_the_picture_of_light_has_values_with_errors() {
+    let mut window = Window::with_scene("cornell");
+    window.click("Primal");
+    window.until("some light", |w| w.resource::<Render>().samples_per_pixel() > 4.0);
+    window.click("⏸ Pause");
+    window.click("Line");
+    assert!(has(&window, "from one place to another"));
+    let camera = |window: &Window| window.with(|w| w.resource::<Viewpoint>().camera().cloned());
+    let before = camera(&window);
+    let width = window.with(|w| w.resource::<Render>().camera().width);
+    let rect = window.harness.get_by_label("Picture").rect();
+    let at = |x: f32| rect.lerp_inside(egui::vec2(x, 0.5));
+    draw(&mut window, at(0.25), at(0.75));
+    assert_eq!(camera(&window), before);
+    assert_eq!(window.harness.get_by_label("Picture").rect(), rect);
+    assert!(has(&window, "Radiance Y along the line, W/(m² sr)"));
+    let long = number(&window, " px long");
+    assert!((long - 0.5 * f64::from(width)).abs() <= 1.0, "{long} of {width} px");
+    let table = copied(&mut window, "Copy as table");
+    let rows: Vec<Vec<&str>> = table.lines().map(|row| row.split('\t').collect()).collect();
+    let head = ["along_px", "x_px", "y_px", "radiance_w_per_m2_sr", "std_error"];
+    assert_eq!(rows[0], head);
+    assert!((rows.len() - 1).abs_diff(width as usize / 2) <= 2, "{} rows", rows.len());
+    let values = said(&window, " values, ");
+    assert!(values[0].starts_with(&format!("{} ", rows.len() - 1)), "{values:?}");
+    let errors: Vec<f64> = rows[1..].iter().map(|row| row[4].parse().expect("an error")).collect();
+    assert!(errors.iter().all(|e| *e >= 0.0) && errors.iter().any(|e| *e > 0.0), "{errors:?}");
+    window.harness.key_press(Key::Escape);
+    window.frames(2);
+    assert!(!has(&window, "along the line"));
+}
+
 /// Columns of what is seen there.
 fn columns(picture: &image::RgbImage, rect: egui::Rect) -> Vec<Vec<[u8; 3]>> {
     let range = |from: f32, to: f32| from.ceil() as u32 + 1..to.floor() as u32 - 1;
