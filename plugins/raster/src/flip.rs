@@ -16,8 +16,8 @@ use crate::Grid;
 /// wide.
 pub const PIXELS_PER_DEGREE: f64 = 67.0;
 
-/// Contrast sensitivity to lightness, to red against green and to blue against yellow, as the sum of
-/// a √(π/b) exp(−π² x²/b) over pairs of (a, b), x in degrees (the paper's table 1).
+/// Contrast sensitivity to lightness, to red against green and to blue against yellow, as the sum
+/// of a √(π/b) exp(−π² x²/b) over pairs of (a, b), x in degrees (the paper's table 1).
 const SENSITIVITY: [&[[f64; 2]]; 3] =
     [&[[1.0, 0.0047]], &[[1.0, 0.0053]], &[[34.1, 0.04], [13.5, 0.025]]];
 /// Exponent of differences of colour (q_c).
@@ -104,7 +104,8 @@ fn linear_of_bytes() -> [f32; 256] {
     })
 }
 
-/// Y, Cx and Cz: like L*a*b*, but linear in light, so that it may be filtered. White is (100, 0, 0).
+/// Y, Cx and Cz: like L*a*b*, but linear in light, so that it may be filtered. White is
+/// (100, 0, 0).
 fn opponent([x, y, z]: [f32; 3]) -> [f32; 3] {
     [116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)]
 }
@@ -328,8 +329,8 @@ mod tests {
         assert!(moved > 0.01 && 5.0 * moved < complement, "{moved} {complement}");
     }
 
-    /// Against the evaluator that the paper's authors publish (version 1.7, asked from outside): the
-    /// mean, and two pixels, of which the first is a corner.
+    /// Against the evaluator that the paper's authors publish (version 1.7, asked from outside):
+    /// the mean, and two pixels, of which the first is a corner.
     #[test]
     fn wild_pictures_are_as_different_as_the_authors_evaluator_says() {
         let found = map(&wild(0), &wild(1));

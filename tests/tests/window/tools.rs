@@ -265,8 +265,8 @@ fn a_kept_view_is_gone_to_and_forgotten() {
     assert!(window.harness.query_by_label("the lamp").is_none(), "it is still listed");
 }
 
-/// A camera of the scene moves the structure's picture as it moves that of light, even while its tab
-/// is behind another one.
+/// A camera of the scene moves the structure's picture as it moves that of light, even while its
+/// tab is behind another one.
 #[test]
 fn a_camera_of_the_scene_moves_both_pictures() {
     let mut window = Window::with_scene("column");

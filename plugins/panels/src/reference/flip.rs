@@ -87,8 +87,8 @@ impl Flip {
         self.is_new = true;
     }
 
-    /// Takes what has been computed, and begins anew where that pays; `rests`: all of the film as it
-    /// is has been compared.
+    /// Takes what has been computed, and begins anew where that pays; `rests`: all of the film as
+    /// it is has been compared.
     pub(super) fn go_on(&mut self, kept: &Arc<Kept>, walks: u64, rests: bool, jobs: &mut Jobs) {
         if let Some(done) = Task::take(&mut self.task) {
             (self.found, self.texture) = (done.ok().flatten(), None);
