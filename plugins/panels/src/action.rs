@@ -21,6 +21,7 @@ use crate::{
     export::Export,
     history::History,
     layout::Layout,
+    light_line::LightLine,
     photos::Photos,
     play,
     recent::Recent,
@@ -60,7 +61,8 @@ pub enum Action {
     Frame,
     /// The scene's own camera.
     Home,
-    /// Another camera of the scene, by its place in the list.
+    /// Another camera of the scene, by its place in the list; the structure is looked at from
+    /// there, too.
     Camera(usize),
     /// Look from a view that is kept of the scene, by its place in the list.
     View(usize),
@@ -237,13 +239,7 @@ fn carry_out(world: &mut World, action: Action) {
                 world.resource_mut::<Viewpoint>().go(home);
             }
         }
-        Action::Camera(index) => {
-            let camera =
-                world.get_resource::<CurrentScene>().and_then(|s| s.0.cameras.get(index).cloned());
-            if let Some(camera) = camera {
-                world.resource_mut::<Viewpoint>().go(camera);
-            }
-        }
+        Action::Camera(index) => views::go_to_camera(world, index),
         Action::View(index) => views::go(world, index),
         Action::KeepView(name) => views::keep(world, &name),
         Action::ForgetView(index) => views::forget(world, index),
@@ -404,8 +400,12 @@ fn dismiss(world: &mut World) {
     {
         return;
     }
-    // A tool over slices that are seen goes before the selection that they are of.
-    if world.resource::<Desk>().place("CT").is_some() && world.resource_mut::<Ct>().end_tool() {
+    // A tool over slices that are seen goes before the selection that they are of, and so does one
+    // over the picture of light.
+    let [slices, light] = ["CT", "Render"].map(|panel| world.resource::<Desk>().has_drawn(panel));
+    if slices && world.resource_mut::<Ct>().end_tool()
+        || light && world.resource_mut::<LightLine>().end()
+    {
         return;
     }
     world.resource_mut::<Selection>().set_if_neq(Selection(None));

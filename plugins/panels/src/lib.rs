@@ -23,6 +23,8 @@ mod inspector;
 mod kept;
 mod layout;
 mod legend;
+mod light_line;
+mod line;
 mod log;
 mod members;
 mod meters;

@@ -14,6 +14,7 @@ use crate::{
     Action, Actions, Look, Quantity, Refine, Selection, Statistics, Viewpoint,
     fields::{self, Fields},
     lang::{drag, fixed, slide, term},
+    light_line::LightLine,
     number::{count, duration, percent, plus_minus},
     orbit,
     outline::Outline,
@@ -35,6 +36,7 @@ pub(crate) fn render(
     mut viewpoint: ResMut<Viewpoint>,
     mut picture: ResMut<Picture>,
     mut reference: ResMut<Reference>,
+    mut line: ResMut<LightLine>,
     mut outline: ResMut<Outline>,
     mut learning: ResMut<Learning>,
     mut fields: ResMut<Fields>,
@@ -45,9 +47,10 @@ pub(crate) fn render(
     mut actions: ResMut<Actions>,
 ) {
     let reference = reference.bypass_change_detection();
+    let line = line.bypass_change_detection();
     let may_keep = render.is_some() && !viewpoint.is_preview();
     let mut new = *look;
-    toolbar(ui, &mut new, &mut refine, may_keep, &mut actions);
+    toolbar(ui, &mut new, &mut refine, line, may_keep, &mut actions);
     steered(ui, &mut new, &mut learning, &fields, &mut ranges);
     look.set_if_neq(new);
     if reference.choice(ui) {
@@ -65,6 +68,7 @@ pub(crate) fn render(
         Quantity::Error | Quantity::Field(_) => 44.0,
     };
     let area = ui.available_rect_before_wrap();
+    let (area, plot) = area.split_top_bottom_at_y(area.bottom() - line.height(area.height()));
     let camera = viewpoint.camera().unwrap_or(render.camera()).clone();
     let rect = fit(
         Rect::from_min_size(area.min, area.size() - vec2(0.0, legend)),
@@ -86,12 +90,13 @@ pub(crate) fn render(
         ui.painter().image(texture.id(), rect, whole, Color32::WHITE);
     }
     if look.quantity == Quantity::Radiance {
-        reference.draw(ui, rect, look.exposure);
+        reference.draw(ui, rect, &look);
     }
     if let Some(texture) = outline.bypass_change_detection().texture(ui.ctx()) {
         ui.painter().image(texture.id(), rect, whole, Color32::WHITE);
     }
-    hand(ui, &response, rect, &mut viewpoint);
+    hand(ui, &response, rect, line, &mut viewpoint);
+    line.draw(&ui.painter().with_clip_rect(rect), rect);
     if look.quantity == Quantity::Radiance {
         reference.divider(ui, rect);
     }
@@ -113,8 +118,12 @@ pub(crate) fn render(
         pos2(rect.left(), rect.bottom() + 4.0),
         pos2(rect.right(), rect.bottom() + 42.0),
     );
+    if line.is_on() && !viewpoint.is_preview() {
+        let asked = line.show(ui, plot, &render, statistics.share(&render), &look, &fields);
+        asked.into_iter().for_each(|action| actions.ask(action));
+    }
     match look.quantity {
-        Quantity::Radiance => reference.figures(ui, below),
+        Quantity::Radiance => reference.figures(ui, below, &look),
         Quantity::Error => {
             let (scale, caption) = (picture::error_scale(&look), picture::error_caption());
             scale::legend(ui, below, &scale, picture::error_share, &caption);
@@ -173,9 +182,22 @@ fn under(lit: &Lit, camera: &Camera, rect: Rect, at: Pos2) -> Under {
     Under { at: share, hit }
 }
 
-/// Drag to orbit, Shift or middle or right drag to pan, wheel to come nearer.
-fn hand(ui: &Ui, response: &egui::Response, rect: Rect, viewpoint: &mut ResMut<Viewpoint>) {
-    let held = response.dragged();
+/// Drag to orbit, or to draw where the tool is out; Shift or middle or right drag to pan, wheel to
+/// come nearer.
+fn hand(
+    ui: &Ui,
+    response: &egui::Response,
+    rect: Rect,
+    line: &mut LightLine,
+    viewpoint: &mut ResMut<Viewpoint>,
+) {
+    let draws = line.is_on()
+        && response.dragged_by(PointerButton::Primary)
+        && !ui.input(|i| i.modifiers.shift);
+    if draws {
+        line.drag(ui, rect);
+    }
+    let held = response.dragged() && !draws;
     if viewpoint.dragged != held {
         viewpoint.dragged = held;
     }
@@ -201,6 +223,7 @@ fn toolbar(
     ui: &mut Ui,
     look: &mut Look,
     refine: &mut ResMut<Refine>,
+    line: &mut LightLine,
     may_keep: bool,
     actions: &mut Actions,
 ) {
@@ -247,6 +270,7 @@ fn toolbar(
         if reference::button(ui, may_keep) {
             actions.ask(Action::KeepReference);
         }
+        line.button(ui);
     });
 }
 

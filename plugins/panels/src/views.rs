@@ -104,11 +104,19 @@ pub(crate) fn keep(world: &mut World, name: &str) {
 pub(crate) fn go(world: &mut World, index: usize) {
     let Some(scene) = scene(world) else { return };
     let Some(view) = world.resource::<Views>().of(&scene.path).get(index).cloned() else { return };
-    world.resource_mut::<Structure>().follow(&view);
+    world.resource_mut::<Structure>().follow(&scene, &view);
     let mut viewpoint = world.resource_mut::<Viewpoint>();
     let Some(now) = viewpoint.camera() else { return };
     let Camera { name, width, height, exposure, .. } = now.clone();
     viewpoint.go(Camera { name, width, height, exposure, ..view });
+}
+
+/// Looks through a camera of the scene, in both pictures.
+pub(crate) fn go_to_camera(world: &mut World, index: usize) {
+    let Some(scene) = scene(world) else { return };
+    let Some(camera) = scene.cameras.get(index) else { return };
+    world.resource_mut::<Structure>().follow(&scene, camera);
+    world.resource_mut::<Viewpoint>().go(camera.clone());
 }
 
 pub(crate) fn forget(world: &mut World, index: usize) {
@@ -174,7 +182,7 @@ fn naming(ui: &mut Ui, name: &mut String, asked: &mut Vec<Action>) {
 fn list(ui: &mut Ui, scene: &Scene, kept: &[Camera], asked: &mut Vec<Action>) {
     egui::ScrollArea::vertical().max_height(320.0).show(ui, |ui| {
         for (index, camera) in scene.cameras.iter().enumerate() {
-            let hint = tr!("A camera of the scene, for the picture of light");
+            let hint = tr!("A camera of the scene, for the structure and the picture of light");
             if ui.button(&camera.name).on_hover_text(hint).clicked() {
                 asked.push(Action::Camera(index));
             }

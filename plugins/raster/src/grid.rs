@@ -81,6 +81,11 @@ impl Grid<f32> {
     /// beyond the border is as at the border.
     #[must_use]
     pub fn convolved(&self, kernel: &[f32], job: &Job) -> Self {
+        self.along_rows(kernel, job).along_columns(kernel, job)
+    }
+
+    /// The same along rows alone.
+    pub(crate) fn along_rows(&self, kernel: &[f32], job: &Job) -> Self {
         let reach = kernel.len() / 2;
         let [w, h] = [self.width, self.height];
         let mut across = Self::new(w, h, 0.0);
@@ -91,12 +96,19 @@ impl Grid<f32> {
             line.extend((0..w + 2 * reach).map(|x| row[x.saturating_sub(reach).min(w - 1)]));
             weigh(kernel, out, |k, at| &line[at + k..]);
         });
+        across
+    }
+
+    /// The same along columns alone.
+    pub(crate) fn along_columns(&self, kernel: &[f32], job: &Job) -> Self {
+        let reach = kernel.len() / 2;
+        let [w, h] = [self.width, self.height];
         let mut down = Self::new(w, h, 0.0);
         let lines = down.data.par_chunks_mut(w.max(1)).enumerate();
         lines.filter(|_| !job.is_cancelled()).for_each(|(y, out)| {
             weigh(kernel, out, |k, at| {
                 let from = (y + k).saturating_sub(reach).min(h - 1);
-                &across.data[from * w + at..]
+                &self.data[from * w + at..]
             });
         });
         down

@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 
+pub mod flip;
 pub mod grid;
 pub mod network;
 

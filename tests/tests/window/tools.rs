@@ -265,6 +265,32 @@ fn a_kept_view_is_gone_to_and_forgotten() {
     assert!(window.harness.query_by_label("the lamp").is_none(), "it is still listed");
 }
 
+/// A camera of the scene moves the structure's picture as it moves that of light, even while its
+/// tab is behind another one.
+#[test]
+fn a_camera_of_the_scene_moves_both_pictures() {
+    let mut window = Window::with_scene("column");
+    let cameras = window.with(|w| w.resource::<CurrentScene>().0.cameras.clone());
+    window.ask(Action::Camera(1));
+    window.frames(2);
+    window.ask(Action::Tab("Structure"));
+    window.frames(3);
+    window.click("As it looks");
+    window.until("light from the second camera", |w| is_structure_from(w, &cameras[1]));
+    window.ask(Action::Views);
+    window.frames(3);
+    window.click(&cameras[0].name);
+    window.until("light from the first camera", |w| is_structure_from(w, &cameras[0]));
+}
+
+/// Whether the structure is shown in light from there: that is asked for in the pixels of its own
+/// panel.
+fn is_structure_from(world: &World, camera: &Camera) -> bool {
+    let place = |c: &Camera| (c.position, c.target, c.fov_deg);
+    let now = world.resource::<Viewpoint>().camera();
+    now.is_some_and(|now| place(now) == place(camera) && now.width != camera.width)
+}
+
 /// A reference is held against the picture: by its figures, and under a divider that is dragged
 /// instead of the camera; with the camera it goes.
 #[test]
@@ -308,6 +334,68 @@ fn a_picture_is_held_against_its_reference() {
     assert!(window.harness.query_by_label("Wipe").is_none(), "it is kept for another camera");
     let said = |w: &mut World| w.resource::<Log>().lines().iter().any(|l| l.contains("is let go"));
     assert!(window.with(said));
+}
+
+/// FLIP is computed off the frame, anew for another view, and shown pixel by pixel.
+#[test]
+fn flip_tells_how_different_a_picture_looks_from_its_reference() {
+    let mut window = Window::with_scene("cornell");
+    window.click("Primal");
+    window.until("some light", |w| w.resource::<Render>().samples_per_pixel() > 4.0);
+    window.click("⏸ Pause");
+    window.click("Keep as reference");
+    window.until_seen("FLIP 0");
+    window.click("Dual");
+    let flip = |window: &Window| -> Option<f64> {
+        said(window, "FLIP ").first()?.strip_prefix("FLIP ")?.parse().ok()
+    };
+    while flip(&window).is_none_or(|flip| flip == 0.0) {
+        window.frame();
+        rest();
+    }
+    assert!(flip(&window).is_some_and(|flip| flip < 1.0), "{:?}", flip(&window));
+    let rect = window.harness.get_by_label("Picture").rect();
+    let [own, difference, map] = ["This picture", "Difference", "FLIP"].map(|shown| {
+        window.click(shown);
+        window.frames(3);
+        columns(&window.picture(), rect)
+    });
+    assert!(map != own && map != difference);
+}
+
+/// A line over the picture of light is a plot with its length, and a table with standard errors;
+/// the camera stays where it is. Escape puts the tool away.
+#[test]
+fn a_line_over_the_picture_of_light_has_values_with_errors() {
+    let mut window = Window::with_scene("cornell");
+    window.click("Primal");
+    window.until("some light", |w| w.resource::<Render>().samples_per_pixel() > 4.0);
+    window.click("⏸ Pause");
+    window.click("Line");
+    assert!(has(&window, "from one place to another"));
+    let camera = |window: &Window| window.with(|w| w.resource::<Viewpoint>().camera().cloned());
+    let before = camera(&window);
+    let width = window.with(|w| w.resource::<Render>().camera().width);
+    let rect = window.harness.get_by_label("Picture").rect();
+    let at = |x: f32| rect.lerp_inside(egui::vec2(x, 0.5));
+    draw(&mut window, at(0.25), at(0.75));
+    assert_eq!(camera(&window), before);
+    assert_eq!(window.harness.get_by_label("Picture").rect(), rect);
+    assert!(has(&window, "Radiance Y along the line, W/(m² sr)"));
+    let long = number(&window, " px long");
+    assert!((long - 0.5 * f64::from(width)).abs() <= 1.0, "{long} of {width} px");
+    let table = copied(&mut window, "Copy as table");
+    let rows: Vec<Vec<&str>> = table.lines().map(|row| row.split('\t').collect()).collect();
+    let head = ["along_px", "x_px", "y_px", "radiance_w_per_m2_sr", "std_error"];
+    assert_eq!(rows[0], head);
+    assert!((rows.len() - 1).abs_diff(width as usize / 2) <= 2, "{} rows", rows.len());
+    let values = said(&window, " values, ");
+    assert!(values[0].starts_with(&format!("{} ", rows.len() - 1)), "{values:?}");
+    let errors: Vec<f64> = rows[1..].iter().map(|row| row[4].parse().expect("an error")).collect();
+    assert!(errors.iter().all(|e| *e >= 0.0) && errors.iter().any(|e| *e > 0.0), "{errors:?}");
+    window.harness.key_press(Key::Escape);
+    window.frames(2);
+    assert!(!has(&window, "along the line"));
 }
 
 /// Columns of what is seen there.

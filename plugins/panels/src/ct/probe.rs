@@ -1,17 +1,14 @@
 //! A line or a region that somebody draws over the slice, and what the slice has there.
 
-use egui::{Color32, Grid, Painter, Rect, RichText, Shape, Stroke, StrokeKind, Ui, Vec2};
-use egui_plot::Line;
+use egui::{Grid, Painter, Rect, RichText, Shape, StrokeKind, Ui, Vec2};
 use intrados_ct::probe::{Region, Shape as Form, along};
 
 use super::source::Read;
 use crate::{
     Action,
-    chart::{place, plot},
-    colours,
     lang::{fixed, term},
+    line::{self, Along},
     number::{copied, percent, plus_minus, significant},
-    saving::Taken,
 };
 
 /// What the left button draws.
@@ -83,9 +80,8 @@ impl Probe {
     /// Follows the pointer from where it was pressed. The slice is drawn at `place` and has edges
     /// of `size`, mm.
     pub(super) fn drag(&mut self, ui: &Ui, place: Rect, size: Vec2) {
-        let ends = ui.input(|i| Some([i.pointer.press_origin()?, i.pointer.interact_pos()?]));
-        let mm = |at| (place.clamp(at) - place.min) / place.size() * size;
-        self.ends = ends.map(|ends| ends.map(mm)).or(self.ends);
+        let ends = line::dragged(ui, place);
+        self.ends = ends.map(|ends| ends.map(|share| share * size)).or(self.ends);
     }
 
     /// Measures what is drawn otherwise than it was measured last. A large region takes longer than
@@ -106,22 +102,16 @@ impl Probe {
     /// Draws it over a slice that begins at `place` and has so many points a mm.
     pub(super) fn draw(&self, painter: &Painter, place: Rect, points_per_mm: f32) {
         let Some((tool, ends)) = self.drawn() else { return };
-        let [from, to] = ends.map(|mm| place.min + points_per_mm * mm);
-        let between = Rect::from_two_pos(from, to);
-        for (width, colour) in [(4.0_f32, Color32::BLACK), (2.0, colours::SELECTED)] {
-            let stroke = Stroke::new(width, colour);
-            painter.add(match tool {
-                Tool::Line => Shape::line_segment([from, to], stroke),
-                Tool::Region(Form::Rectangle) => {
-                    Shape::rect_stroke(between, 0.0, stroke, StrokeKind::Middle)
-                }
-                Tool::Region(Form::Ellipse) => {
-                    Shape::ellipse_stroke(between.center(), 0.5 * between.size(), stroke)
-                }
-            });
-        }
-        if tool == Tool::Line {
-            painter.circle(from, 4.0, colours::SELECTED, (1.0, Color32::BLACK));
+        let ends = ends.map(|mm| place.min + points_per_mm * mm);
+        let between = Rect::from_two_pos(ends[0], ends[1]);
+        match tool {
+            Tool::Line => line::draw(painter, ends),
+            Tool::Region(Form::Rectangle) => line::outline(painter, |stroke| {
+                Shape::rect_stroke(between, 0.0, stroke, StrokeKind::Middle)
+            }),
+            Tool::Region(Form::Ellipse) => line::outline(painter, |stroke| {
+                Shape::ellipse_stroke(between.center(), 0.5 * between.size(), stroke)
+            }),
         }
     }
 }
@@ -137,7 +127,7 @@ pub(super) fn results(
     title(ui, tool, ends[1] - ends[0], unit);
     let found = found?;
     match found {
-        Found::Line(values) => line(ui, values, unit, height),
+        Found::Line(values) => plotted(ui, values, unit, height),
         Found::Region(Some(region)) => numbers(ui, region, unit),
         Found::Region(None) => {
             ui.weak(tr!("No pixel's centre lies in it."));
@@ -145,15 +135,7 @@ pub(super) fn results(
         }
     }
     let name = if tool == Tool::Line { "line" } else { "region" };
-    let buttons = ui.horizontal(|ui| {
-        if ui.small_button(tr!("Copy as table")).clicked() {
-            // Spreadsheets part what is pasted at tabs.
-            ui.ctx().copy_text(csv(found, (tool, ends), unit).replace(',', "\t"));
-        }
-        let saves = ui.small_button(tr!("Save as CSV…")).clicked();
-        saves.then(|| Action::Save(Taken::Values(name, csv(found, (tool, ends), unit))))
-    });
-    buttons.inner
+    ui.horizontal(|ui| line::taken(ui, name, || csv(found, (tool, ends), unit))).inner
 }
 
 fn title(ui: &mut Ui, tool: Tool, size: Vec2, unit: &str) {
@@ -180,22 +162,16 @@ fn title(ui: &mut Ui, tool: Tool, size: Vec2, unit: &str) {
     });
 }
 
-fn line(ui: &mut Ui, values: &[[f64; 2]], unit: &str, height: f32) {
-    let chart = plot("along the line").height(height).x_axis_label("mm").label_formatter(|hover| {
-        let p = place(hover);
-        Some(tr!("{} at {} mm", significant(p.y, 3), fixed(p.x, 2)))
-    });
-    let shown = chart.show(ui, |chart| {
-        chart.line(Line::new(term(unit), values.to_vec()).color(colours::PRIMAL).width(1.5));
-    });
-    let ends = values
-        .iter()
-        .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v[1]), high.max(v[1])]);
-    let [low, high] = ends.map(|v| significant(v, 4));
-    shown.response.widget_info(|| {
-        let said = tr!("{} values, {} to {}", values.len(), low, high);
-        egui::WidgetInfo::labeled(egui::Role::Image, true, said)
-    });
+fn plotted(ui: &mut Ui, values: &[[f64; 2]], unit: &str, height: f32) {
+    // Of a slice no error is known.
+    let values: Vec<[f64; 3]> = values.iter().map(|[s, value]| [*s, *value, f64::NAN]).collect();
+    let along = Along {
+        name: term(unit),
+        axis: "mm",
+        values: &values,
+        told: |p| tr!("{} at {} mm", significant(p.y, 3), fixed(p.x, 2)),
+    };
+    line::show(ui, &along, height);
 }
 
 fn numbers(ui: &mut Ui, region: &Region, unit: &str) {

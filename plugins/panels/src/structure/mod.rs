@@ -64,6 +64,9 @@ pub(crate) struct Structure {
     /// Where on its member the evidence is that a form asks for.
     place: Option<Vec3>,
     wished: Option<View>,
+    /// A camera through which somebody wants to look, and the hash of the scene that it is of; it
+    /// waits until the panel is in sight.
+    followed: Option<(String, Camera)>,
     /// Whether it is shown as it looks, not by its damage.
     is_lit: bool,
     settling: Settling,
@@ -79,6 +82,7 @@ impl Default for Structure {
             tape: Tape::default(),
             place: None,
             wished: None,
+            followed: None,
             is_lit: false,
             settling: Settling::default(),
         }
@@ -90,15 +94,33 @@ impl Structure {
         self.wished = Some(view);
     }
 
-    /// Where it is looked at from, once it was shown.
+    /// Where it is looked at from, once that is known.
     pub(crate) fn camera(&self) -> Option<&Camera> {
-        self.model.camera()
+        self.followed.as_ref().map(|(_, camera)| camera).or(self.model.camera())
     }
 
-    /// Looks from there.
-    pub(crate) fn follow(&mut self, camera: &Camera) {
-        self.model.follow(camera);
-        self.earlier.follow(camera);
+    /// Looks at the scene from there, whatever else was wished before.
+    pub(crate) fn follow(&mut self, scene: &Scene, camera: &Camera) {
+        self.wished = None;
+        self.followed = Some((scene.hash.clone(), camera.clone()));
+    }
+
+    /// Goes where somebody wants to look from.
+    fn go(&mut self, scene: &Arc<Scene>, member: Option<usize>, is_compared: bool) {
+        if let Some((_, camera)) = self.followed.take().filter(|(of, _)| *of == scene.hash) {
+            // With the surfaces of another scene they would let the camera go.
+            self.model.adopt(scene);
+            if is_compared {
+                self.earlier.adopt(scene);
+            }
+            self.model.follow(&camera);
+            self.earlier.follow(&camera);
+        }
+        if let Some(view) = self.wished.take() {
+            let member = member.filter(|_| view == View::Framed);
+            self.model.go(view, scene, member);
+            self.model.camera().iter().for_each(|camera| self.earlier.follow(camera));
+        }
     }
 
     /// Where the evidence is that a form asks for.
@@ -153,11 +175,7 @@ pub(crate) fn structure(
     let whole = ui.available_rect_before_wrap();
     let history = history.bypass_change_detection();
     let structure = structure.bypass_change_detection();
-    if let Some(view) = structure.wished.take() {
-        let member = if view == View::Framed { selection.0 } else { None };
-        structure.model.go(view, scene, member);
-        structure.model.camera().iter().for_each(|camera| structure.earlier.follow(camera));
-    }
+    structure.go(scene, selection.0, history.beside().is_some());
     let section = structure.section;
     // What is cut open, or compared, is not as it looks.
     let is_lit = structure.is_lit && section.is_none() && history.beside().is_none();

@@ -257,7 +257,7 @@ impl Model {
     }
 
     /// Takes the surfaces of another scene; the camera stays where it was in one that is like it.
-    fn adopt(&mut self, scene: &Arc<Scene>) {
+    pub(super) fn adopt(&mut self, scene: &Arc<Scene>) {
         if self.of == scene.hash {
             return;
         }
