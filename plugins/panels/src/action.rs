@@ -11,7 +11,8 @@ use intrados_scene::{
 };
 
 use crate::{
-    Banners, Colours, Jump, Language, Log, Look, Quantity, Refine, Selection, Viewpoint, Workspace,
+    Banners, Colours, Jump, Language, Lengths, Log, Look, Quantity, Refine, Selection, Viewpoint,
+    Workspace,
     attach::Form,
     command::Palette,
     create::Creation,
@@ -100,6 +101,8 @@ pub enum Action {
     Theme(egui::ThemePreference),
     /// Speak a language.
     Speak(Language),
+    /// Write lengths in this unit.
+    Lengths(Lengths),
     /// Show numbers in these colours.
     Colours(Colours),
     /// Fill the screen, or no more.
@@ -274,6 +277,7 @@ fn carry_out(world: &mut World, action: Action) {
         Action::ResetLayout => world.resource_mut::<Desk>().reset(),
         Action::Theme(theme) => world.resource_mut::<Desk>().dress(theme),
         Action::Speak(language) => world.resource_mut::<Desk>().speak(language),
+        Action::Lengths(lengths) => world.resource_mut::<Desk>().measure_in(lengths),
         Action::Colours(colours) => world.resource_mut::<Look>().colours = colours,
         Action::Fullscreen => world.resource_mut::<Layout>().toggle_fullscreen(),
         Action::Quit => world.resource_mut::<Layout>().quits = true,

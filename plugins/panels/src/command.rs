@@ -7,7 +7,7 @@ use intrados_light::View;
 use intrados_scene::plugin::CurrentScene;
 
 use crate::{
-    Action, Actions, Jump, Language, Look, Quantity, Workspace,
+    Action, Actions, Jump, Language, Lengths, Look, Quantity, Workspace,
     lang::{self, term},
     layout::Layout,
     place::Panels,
@@ -185,6 +185,9 @@ fn all(world: &World) -> Vec<Command> {
     }
     for (name, colours) in scale::choices(world.resource::<Look>().colours).into_iter().flatten() {
         all.push(command(tr!("colours: {}", name), "", None, Action::Colours(colours)));
+    }
+    for lengths in Lengths::ALL {
+        all.push(command(tr!("lengths in {}", lengths.name()), "", None, Action::Lengths(lengths)));
     }
     for panel in &world.resource::<Panels>().0 {
         let action = Action::Panel(panel.name.clone(), true);

@@ -13,6 +13,7 @@ use super::{section::Section, spot::Spot};
 use crate::{
     Latest, Selection, colours,
     lang::{fixed, local, term},
+    lengths,
     moment::{Seen, place as place_of},
     number::plus_minus,
     orbit,
@@ -580,15 +581,8 @@ pub(super) fn ruler(ui: &Ui, rect: Rect, camera: &Camera) {
     let width = 2.0 * camera.half_extent()[0] * distance;
     let metre = rect.width() / width.max(1e-6);
     // The largest round length that takes less than a fifth of the picture.
-    let most = 0.2 * rect.width() / metre;
-    let power = 10_f32.powf(most.log10().floor());
-    let length = [5.0, 2.0, 1.0].map(|k| k * power).into_iter().find(|l| *l <= most);
-    let Some(length) = length.filter(|l| l.is_finite()) else { return };
-    let text = if length < 1.0 {
-        tr!("{} mm at the middle", fixed(1e3 * length, 0))
-    } else {
-        tr!("{} m at the middle", fixed(length, 0))
-    };
+    let Some(length) = lengths::round_within(0.2 * rect.width() / metre) else { return };
+    let text = tr!("{} at the middle", lengths::rounded(length));
     let ink = ui.visuals().text_color();
     let left = rect.left_bottom() + vec2(14.0, -14.0);
     let right = left + vec2(length * metre, 0.0);
