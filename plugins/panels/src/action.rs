@@ -71,6 +71,8 @@ pub enum Action {
     ForgetView(usize),
     /// Show or hide the list of views.
     Views,
+    /// Fly along the selected member; of a flight, halt it or let it go on.
+    Fly,
     /// Look at another side.
     Show(View),
     /// Light or its error.
@@ -255,6 +257,7 @@ fn carry_out(world: &mut World, action: Action) {
             views.is_open = !views.is_open;
         }
         Action::Frame => frame(world),
+        Action::Fly => fly(world),
         Action::Show(view) => world.resource_mut::<Look>().view = view,
         Action::ShowQuantity(quantity) => world.resource_mut::<Look>().quantity = quantity,
         Action::KeepReference => reference::keep(world),
@@ -344,6 +347,20 @@ fn fill(world: &mut World, files: Vec<PathBuf>, place: Option<(f32, Option<Face>
     }
 }
 
+/// Flies along the selected member; halts a flight, or lets it go on.
+fn fly(world: &mut World) {
+    let is_flying = world.resource::<Structure>().is_flying();
+    if !is_flying && world.resource::<Selection>().0.is_none() {
+        world.resource_mut::<Banners>().cannot(
+            &tr!("A flight along which member?"),
+            &tr!("select one first, in the picture or in the list"),
+        );
+        return;
+    }
+    show_tab(world, "Structure");
+    world.resource_mut::<Structure>().fly_or_halt();
+}
+
 /// Opens an earlier prediction of the structure that is open.
 fn compare(world: &mut World, path: &Path) {
     let Some(scene) = world.get_resource::<CurrentScene>().map(|s| s.0.clone()) else { return };
@@ -405,6 +422,11 @@ fn dismiss(world: &mut World) {
         || std::mem::take(&mut world.resource_mut::<Views>().is_open)
         || std::mem::take(&mut world.resource_mut::<Layout>().keys)
         || world.resource_mut::<Banners>().dismiss()
+    {
+        return;
+    }
+    if world.resource::<Desk>().has_drawn("Structure")
+        && world.resource_mut::<Structure>().end_flight()
     {
         return;
     }

@@ -14,6 +14,7 @@ use crate::{
     recent::Recent,
     saving::Taken,
     scale,
+    structure::Structure,
     views::Views,
     workspace::Desk,
 };
@@ -140,6 +141,7 @@ fn fixed(look: &Look) -> Vec<Command> {
         ),
         command(tr!("keep this view"), "", None, Action::KeepView(String::new())),
         command(tr!("list of views, to name and to forget them"), "", None, Action::Views),
+        command(tr!("fly along the selected member, or halt"), "", None, Action::Fly),
         command(tr!("pause or continue"), "Space", by(NONE, Key::Space), Action::Pause),
         command(tr!("restart the picture"), "R", by(NONE, Key::R), Action::Restart),
         command(tr!("primal side"), "1", by(NONE, Key::Num1), Action::Show(View::Primal)),
@@ -250,8 +252,15 @@ pub(crate) fn keys(ui: &Ui, world: &mut World) {
         .map(|(_, action)| action)
         .collect()
     });
+    // What pauses the picture of light halts a flight that is seen.
+    let flies = world.resource::<Structure>().is_flying()
+        && world.resource::<Desk>().has_drawn("Structure");
+    let meant = |action: Action| match action {
+        Action::Pause if flies => Action::Fly,
+        action => action,
+    };
     let mut actions = world.resource_mut::<Actions>();
-    asked.into_iter().for_each(|action| actions.ask(action));
+    asked.into_iter().map(meant).for_each(|action| actions.ask(action));
 }
 
 /// The sheet of keys.

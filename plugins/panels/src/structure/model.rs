@@ -9,7 +9,10 @@ use intrados_scene::{Camera, Scene};
 use intrados_stage::{Jobs, Task, alone};
 use rayon::prelude::*;
 
-use super::{section::Section, spot::Spot};
+use super::{
+    section::{self, Section},
+    spot::Spot,
+};
 use crate::{
     Latest, Selection, colours,
     lang::{fixed, local, term},
@@ -86,6 +89,8 @@ pub(super) struct Model {
     shown: Option<Shown>,
     /// The member along which a place is dragged: there, the camera stays.
     slides: Option<usize>,
+    /// The camera flies by itself: what is drawn is gone in the next frame.
+    flies: bool,
     /// The fine picture that is being drawn, and what of.
     coming: Option<(Key, Task<Painted>)>,
 }
@@ -196,7 +201,7 @@ impl Model {
         let slides = response.dragged() && self.slides.is_some();
         let slides = slides && begun.map(|spot| spot.member) == self.slides;
         let camera = if slides { camera } else { hand(ui, &response, rect, camera) };
-        let is_moving = response.dragged() || camera != before;
+        let is_moving = response.dragged() || camera != before || self.flies;
         self.camera = Some(camera.clone());
         let members = self.facets.iter().map(|f| f.member + 1).max().unwrap_or(0);
         let of = |member: usize| seen.get(member).copied().unwrap_or_default();
@@ -239,6 +244,21 @@ impl Model {
     /// From now on a place is dragged along this member, or along none.
     pub(super) fn slide(&mut self, along: Option<usize>) {
         self.slides = along;
+    }
+
+    /// Whether the camera flies by itself.
+    pub(super) fn fly(&mut self, flies: bool) {
+        self.flies = flies;
+    }
+
+    /// Whether it has shown this scene.
+    pub(super) fn shows(&self, scene: &Scene) -> bool {
+        self.camera.is_some() && self.of == scene.hash
+    }
+
+    /// The surface of a member.
+    pub(super) fn triangles(&self, member: usize) -> impl Iterator<Item = [Vec3; 3]> {
+        self.facets.iter().filter(move |f| f.member == member).map(|f| f.corners)
     }
 
     /// Whether it is looked at from very far.
@@ -409,6 +429,7 @@ impl Model {
                 Some(section) => Arc::new(section.cut(&whole, bounds)),
                 None => whole,
             };
+            let facets = section::before(facets, &key.camera);
             let values: Vec<f32> = facets.iter().flat_map(|f| [key.value(f); 3]).collect();
             let positions: Vec<Vec3> = facets.iter().flat_map(|f| f.corners).collect();
             let faces: Vec<[u32; 4]> = (0..facets.len() as u32)
