@@ -41,7 +41,9 @@ use crate::{
     report::Report,
     saving::{self, Saving},
     scale::{self, Ranges},
-    session, start,
+    session,
+    smooth::Smoothed,
+    start,
     stress::Stress,
     toast, views,
     workspace::{self, Desk},
@@ -160,6 +162,7 @@ pub fn is_busy(world: &mut World) -> bool {
         || world.resource::<Learning>().is_coming()
         || world.resource::<Fields>().is_busy()
         || world.resource::<Picture>().is_behind()
+        || world.resource::<Smoothed>().is_busy()
         || world.resource::<Reference>().is_behind()
         || world.resource::<Dialogs>().is_open()
         || world.resource::<Outline>().is_busy()

@@ -45,6 +45,7 @@ mod saving;
 mod scale;
 mod session;
 mod sheet;
+mod smooth;
 mod start;
 mod statistics;
 mod steering;

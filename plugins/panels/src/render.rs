@@ -20,6 +20,7 @@ use crate::{
     picture::{self, Cursor, Picture, Under},
     reference::{self, Reference},
     scale::{self, Ranges},
+    smooth::{self, Smoothed},
     steering,
 };
 
@@ -34,6 +35,7 @@ pub(crate) fn render(
     mut refine: ResMut<Refine>,
     mut viewpoint: ResMut<Viewpoint>,
     mut picture: ResMut<Picture>,
+    mut smoothed: ResMut<Smoothed>,
     mut reference: ResMut<Reference>,
     mut outline: ResMut<Outline>,
     mut learning: ResMut<Learning>,
@@ -47,7 +49,8 @@ pub(crate) fn render(
     let reference = reference.bypass_change_detection();
     let may_keep = render.is_some() && !viewpoint.is_preview();
     let mut new = *look;
-    toolbar(ui, &mut new, &mut refine, may_keep, &mut actions);
+    let smoothed = smoothed.bypass_change_detection();
+    toolbar(ui, &mut new, &mut refine, smoothed, may_keep, &mut actions);
     steered(ui, &mut new, &mut learning, &fields, &mut ranges);
     look.set_if_neq(new);
     if reference.choice(ui) {
@@ -86,6 +89,13 @@ pub(crate) fn render(
         ui.painter().image(texture.id(), rect, whole, Color32::WHITE);
     }
     if look.quantity == Quantity::Radiance {
+        // What is held against a reference is the picture as it is.
+        if !reference.is_kept()
+            && let Some(texture) = smoothed.texture(ui.ctx())
+        {
+            ui.painter().image(texture, rect, whole, Color32::WHITE);
+            smooth::mark(ui, rect);
+        }
         reference.draw(ui, rect, look.exposure);
     }
     if let Some(texture) = outline.bypass_change_detection().texture(ui.ctx()) {
@@ -204,6 +214,7 @@ fn toolbar(
     ui: &mut Ui,
     look: &mut Look,
     refine: &mut ResMut<Refine>,
+    smoothed: &mut Smoothed,
     may_keep: bool,
     actions: &mut Actions,
 ) {
@@ -250,6 +261,7 @@ fn toolbar(
         if reference::button(ui, may_keep) {
             actions.ask(Action::KeepReference);
         }
+        smooth::switch(ui, smoothed);
     });
 }
 

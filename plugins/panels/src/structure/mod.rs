@@ -276,6 +276,10 @@ pub(crate) fn structure(
             let timeline = &courses.timeline;
             let time = (&mut moment, timeline, play.is_on);
             tools(ui, structure, history, *selection, time, &mut actions);
+            if is_lit {
+                let frame = egui::Frame::popup(ui.style()).inner_margin(4);
+                frame.show(ui, |ui| light.tools(ui));
+            }
             flown(ui, structure, scene, *selection, &mut actions);
         });
     });
