@@ -167,9 +167,7 @@ fn rotated(mut a: [[f64; 3]; 3]) -> ([f64; 3], Frame) {
     let mut rows = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     for _ in 0..SWEEPS {
         let off = a[0][1].abs() + a[0][2].abs() + a[1][2].abs();
-        if off.is_nan()
-            || off <= NEGLIGIBLE * (a[0][0].abs() + a[1][1].abs() + a[2][2].abs())
-        {
+        if off.is_nan() || off <= NEGLIGIBLE * (a[0][0].abs() + a[1][1].abs() + a[2][2].abs()) {
             break;
         }
         for (p, q, r) in [(0, 1, 2), (0, 2, 1), (1, 2, 0)] {
@@ -295,8 +293,8 @@ pub(crate) fn principals(s: &Voigt) -> [f64; 3] {
     }
     let det = a * (b * c - yz * yz) - xy * (xy * c - yz * zx) + zx * (xy * yz - b * zx);
     let angle = (0.5 * det / size.powi(3)).clamp(-1.0, 1.0).acos() / 3.0;
-    let [most, least] = [0.0, 2.0]
-        .map(|k| mean + 2.0 * size * (angle + k * std::f64::consts::FRAC_PI_3).cos());
+    let [most, least] =
+        [0.0, 2.0].map(|k| mean + 2.0 * size * (angle + k * std::f64::consts::FRAC_PI_3).cos());
     [most, 3.0 * mean - most - least, least]
 }
 

@@ -11,7 +11,8 @@ use intrados_scene::{
 };
 
 use crate::{
-    Banners, Colours, Jump, Language, Log, Look, Quantity, Refine, Selection, Viewpoint, Workspace,
+    Banners, Colours, Jump, Language, Lengths, Log, Look, Quantity, Refine, Selection, Viewpoint,
+    Workspace,
     attach::Form,
     command::Palette,
     create::Creation,
@@ -72,6 +73,8 @@ pub enum Action {
     ForgetView(usize),
     /// Show or hide the list of views.
     Views,
+    /// Fly along the selected member; of a flight, halt it or let it go on.
+    Fly,
     /// Look at another side.
     Show(View),
     /// Light or its error.
@@ -102,6 +105,8 @@ pub enum Action {
     Theme(egui::ThemePreference),
     /// Speak a language.
     Speak(Language),
+    /// Write lengths in this unit.
+    Lengths(Lengths),
     /// Show numbers in these colours.
     Colours(Colours),
     /// Fill the screen, or no more.
@@ -248,6 +253,7 @@ fn carry_out(world: &mut World, action: Action) {
             views.is_open = !views.is_open;
         }
         Action::Frame => frame(world),
+        Action::Fly => fly(world),
         Action::Show(view) => world.resource_mut::<Look>().view = view,
         Action::ShowQuantity(quantity) => world.resource_mut::<Look>().quantity = quantity,
         Action::KeepReference => reference::keep(world),
@@ -270,6 +276,7 @@ fn carry_out(world: &mut World, action: Action) {
         Action::ResetLayout => world.resource_mut::<Desk>().reset(),
         Action::Theme(theme) => world.resource_mut::<Desk>().dress(theme),
         Action::Speak(language) => world.resource_mut::<Desk>().speak(language),
+        Action::Lengths(lengths) => world.resource_mut::<Desk>().measure_in(lengths),
         Action::Colours(colours) => world.resource_mut::<Look>().colours = colours,
         Action::Fullscreen => world.resource_mut::<Layout>().toggle_fullscreen(),
         Action::Quit => world.resource_mut::<Layout>().quits = true,
@@ -336,6 +343,20 @@ fn fill(world: &mut World, files: Vec<PathBuf>, place: Option<(f32, Option<Face>
     }
 }
 
+/// Flies along the selected member; halts a flight, or lets it go on.
+fn fly(world: &mut World) {
+    let is_flying = world.resource::<Structure>().is_flying();
+    if !is_flying && world.resource::<Selection>().0.is_none() {
+        world.resource_mut::<Banners>().cannot(
+            &tr!("A flight along which member?"),
+            &tr!("select one first, in the picture or in the list"),
+        );
+        return;
+    }
+    show_tab(world, "Structure");
+    world.resource_mut::<Structure>().fly_or_halt();
+}
+
 /// Opens an earlier prediction of the structure that is open.
 fn compare(world: &mut World, path: &Path) {
     let Some(scene) = world.get_resource::<CurrentScene>().map(|s| s.0.clone()) else { return };
@@ -397,6 +418,11 @@ fn dismiss(world: &mut World) {
         || std::mem::take(&mut world.resource_mut::<Views>().is_open)
         || std::mem::take(&mut world.resource_mut::<Layout>().keys)
         || world.resource_mut::<Banners>().dismiss()
+    {
+        return;
+    }
+    if world.resource::<Desk>().has_drawn("Structure")
+        && world.resource_mut::<Structure>().end_flight()
     {
         return;
     }

@@ -7,13 +7,14 @@ use intrados_light::View;
 use intrados_scene::plugin::CurrentScene;
 
 use crate::{
-    Action, Actions, Jump, Language, Look, Quantity, Workspace,
+    Action, Actions, Jump, Language, Lengths, Look, Quantity, Workspace,
     lang::{self, term},
     layout::Layout,
     place::Panels,
     recent::Recent,
     saving::Taken,
     scale,
+    structure::Structure,
     views::Views,
     workspace::Desk,
 };
@@ -140,6 +141,7 @@ fn fixed(look: &Look) -> Vec<Command> {
         ),
         command(tr!("keep this view"), "", None, Action::KeepView(String::new())),
         command(tr!("list of views, to name and to forget them"), "", None, Action::Views),
+        command(tr!("fly along the selected member, or halt"), "", None, Action::Fly),
         command(tr!("pause or continue"), "Space", by(NONE, Key::Space), Action::Pause),
         command(tr!("restart the picture"), "R", by(NONE, Key::R), Action::Restart),
         command(tr!("primal side"), "1", by(NONE, Key::Num1), Action::Show(View::Primal)),
@@ -185,6 +187,9 @@ fn all(world: &World) -> Vec<Command> {
     }
     for (name, colours) in scale::choices(world.resource::<Look>().colours).into_iter().flatten() {
         all.push(command(tr!("colours: {}", name), "", None, Action::Colours(colours)));
+    }
+    for lengths in Lengths::ALL {
+        all.push(command(tr!("lengths in {}", lengths.name()), "", None, Action::Lengths(lengths)));
     }
     for panel in &world.resource::<Panels>().0 {
         let action = Action::Panel(panel.name.clone(), true);
@@ -247,8 +252,15 @@ pub(crate) fn keys(ui: &Ui, world: &mut World) {
         .map(|(_, action)| action)
         .collect()
     });
+    // What pauses the picture of light halts a flight that is seen.
+    let flies = world.resource::<Structure>().is_flying()
+        && world.resource::<Desk>().has_drawn("Structure");
+    let meant = |action: Action| match action {
+        Action::Pause if flies => Action::Fly,
+        action => action,
+    };
     let mut actions = world.resource_mut::<Actions>();
-    asked.into_iter().for_each(|action| actions.ask(action));
+    asked.into_iter().map(meant).for_each(|action| actions.ask(action));
 }
 
 /// The sheet of keys.

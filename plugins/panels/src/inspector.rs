@@ -10,6 +10,7 @@ use crate::{
     Latest, Look, Selection, Statistics, colours,
     fields::{self, Fields},
     lang::{fixed, term},
+    lengths,
     number::{percent, plus_minus, significant},
     picture::{self, Cursor, Under, relative_error},
 };
@@ -89,8 +90,7 @@ fn under_cursor(
         }
         if let Some((object, point)) = under.hit {
             ui.weak(tr!("Point"));
-            let [x, y, z] = point.to_array().map(|x| fixed(x, 3));
-            ui.label(tr!("{}, {}, {} m", x, y, z));
+            ui.label(lengths::point(point));
             ui.end_row();
             if let Some(object) = scene.objects.get(object) {
                 ui.weak(tr!("Object"));
@@ -121,9 +121,7 @@ fn selected(ui: &mut Ui, index: usize, member: &Member, latest: &Latest) {
             member.concrete.clone()
         };
         row(&tr!("Concrete"), concrete);
-        let size = (member.bounds[1] - member.bounds[0]).to_array();
-        let [x, y, z] = size.map(|x| fixed(x, 2));
-        row(&tr!("Size"), format!("{x} × {y} × {z} m"));
+        row(&tr!("Size"), lengths::sides(member.bounds[1] - member.bounds[0]));
         if member.volume > 0.0 {
             row(&tr!("Volume"), format!("{} m³", fixed(member.volume, 3)));
         }

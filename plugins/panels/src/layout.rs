@@ -19,7 +19,7 @@ use intrados_scene::{
 use intrados_stage::{Jobs, Pace, catch};
 
 use crate::{
-    Action, Actions, Banners, Language, Latest, Log, Look, Selection, Workspace,
+    Action, Actions, Banners, Language, Latest, Lengths, Log, Look, Selection, Workspace,
     attach::{self, Form},
     banner, command,
     create::{self, Creation},
@@ -41,7 +41,9 @@ use crate::{
     report::Report,
     saving::{self, Saving},
     scale::{self, Ranges},
-    session, start,
+    session,
+    smooth::Smoothed,
+    start,
     stress::Stress,
     toast, views,
     workspace::{self, Desk},
@@ -160,6 +162,7 @@ pub fn is_busy(world: &mut World) -> bool {
         || world.resource::<Learning>().is_coming()
         || world.resource::<Fields>().is_busy()
         || world.resource::<Picture>().is_behind()
+        || world.resource::<Smoothed>().is_busy()
         || world.resource::<Reference>().is_behind()
         || world.resource::<Dialogs>().is_open()
         || world.resource::<Outline>().is_busy()
@@ -379,7 +382,7 @@ fn edits(world: &World, is_open: bool) -> [(String, &'static str, bool, Action);
     ]
 }
 
-/// Layouts, panels, themes, colours and languages.
+/// Layouts, panels, themes, colours, units of lengths and languages.
 fn arrangement(ui: &mut Ui, world: &World, asked: &mut Vec<Action>) {
     let desk = world.resource::<Desk>();
     for workspace in Workspace::BOTH {
@@ -421,6 +424,13 @@ fn arrangement(ui: &mut Ui, world: &World, asked: &mut Vec<Action>) {
                 if ui.radio(colours == now, name).clicked() {
                     asked.push(Action::Colours(colours));
                 }
+            }
+        }
+    });
+    ui.menu_button(tr!("Lengths in"), |ui| {
+        for lengths in Lengths::ALL {
+            if ui.radio(desk.lengths() == lengths, lengths.name()).clicked() {
+                asked.push(Action::Lengths(lengths));
             }
         }
     });

@@ -11,8 +11,8 @@ use crate::{
     Viewpoint, action, attach, banner, command, convergence, create, ct, dialog, directions, drops,
     edits, export, fields, history, inspector, layout, light_line, log, members, meters, moment,
     outline, photos, picture, place::Panels, play, prediction, recent, reference, refine, render,
-    report, saving, session, sheet, statistics, steering, stress, structure, toast, viewpoint,
-    views, workspace,
+    report, saving, session, sheet, smooth, statistics, steering, stress, structure, toast,
+    viewpoint, views, workspace,
 };
 
 /// Adds the window's state and the built-in panels. It opens no window: whoever has one calls
@@ -70,6 +70,7 @@ impl Plugin for PanelsPlugin {
             .init_resource::<Log>()
             .init_resource::<picture::Picture>()
             .init_resource::<picture::Cursor>()
+            .init_resource::<smooth::Smoothed>()
             .init_resource::<reference::Reference>()
             .init_resource::<light_line::LightLine>()
             .init_resource::<outline::Outline>()
@@ -112,7 +113,7 @@ impl Plugin for PanelsPlugin {
                     prediction::gather,
                     (history::keep, moment::follow),
                     refine::keep_time,
-                    picture::develop,
+                    (picture::develop, smooth::smooth),
                     reference::compare,
                     fields::paint,
                     statistics::observe,

@@ -21,6 +21,7 @@ use crate::{
     picture::{self, Cursor, Picture, Under},
     reference::{self, Reference},
     scale::{self, Ranges},
+    smooth::{self, Smoothed},
     steering,
 };
 
@@ -35,8 +36,12 @@ pub(crate) fn render(
     mut refine: ResMut<Refine>,
     mut viewpoint: ResMut<Viewpoint>,
     mut picture: ResMut<Picture>,
-    mut reference: ResMut<Reference>,
-    mut line: ResMut<LightLine>,
+    // A system takes no more parameters: what lies over the picture goes together.
+    (mut smoothed, mut reference, mut line): (
+        ResMut<Smoothed>,
+        ResMut<Reference>,
+        ResMut<LightLine>,
+    ),
     mut outline: ResMut<Outline>,
     mut learning: ResMut<Learning>,
     mut fields: ResMut<Fields>,
@@ -48,9 +53,10 @@ pub(crate) fn render(
 ) {
     let reference = reference.bypass_change_detection();
     let line = line.bypass_change_detection();
+    let smoothed = smoothed.bypass_change_detection();
     let may_keep = render.is_some() && !viewpoint.is_preview();
     let mut new = *look;
-    toolbar(ui, &mut new, &mut refine, line, may_keep, &mut actions);
+    toolbar(ui, &mut new, &mut refine, (smoothed, line), may_keep, &mut actions);
     steered(ui, &mut new, &mut learning, &fields, &mut ranges);
     look.set_if_neq(new);
     if reference.choice(ui) {
@@ -90,6 +96,13 @@ pub(crate) fn render(
         ui.painter().image(texture.id(), rect, whole, Color32::WHITE);
     }
     if look.quantity == Quantity::Radiance {
+        // What is held against a reference is the picture as it is.
+        if !reference.is_kept()
+            && let Some(texture) = smoothed.texture(ui.ctx())
+        {
+            ui.painter().image(texture, rect, whole, Color32::WHITE);
+            smooth::mark(ui, rect);
+        }
         reference.draw(ui, rect, &look);
     }
     if let Some(texture) = outline.bypass_change_detection().texture(ui.ctx()) {
@@ -223,7 +236,7 @@ fn toolbar(
     ui: &mut Ui,
     look: &mut Look,
     refine: &mut ResMut<Refine>,
-    line: &mut LightLine,
+    (smoothed, line): (&mut Smoothed, &mut LightLine),
     may_keep: bool,
     actions: &mut Actions,
 ) {
@@ -271,6 +284,7 @@ fn toolbar(
             actions.ask(Action::KeepReference);
         }
         line.button(ui);
+        smooth::switch(ui, smoothed);
     });
 }
 

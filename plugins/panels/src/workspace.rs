@@ -15,8 +15,9 @@ use egui_tiles::{
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    Colours, Language, Place, kept,
+    Colours, Language, Lengths, Place, kept,
     lang::{self, term},
+    lengths,
     place::{Panel, Panels},
     scale::Ranges,
 };
@@ -85,6 +86,8 @@ struct Kept {
     /// None: as the system has it.
     #[serde(default)]
     language: Option<Language>,
+    #[serde(default)]
+    lengths: Lengths,
     #[serde(default)]
     colours: Colours,
     #[serde(default)]
@@ -238,6 +241,8 @@ pub(crate) struct Desk {
     theme: egui::ThemePreference,
     /// None: as the system has it.
     language: Option<Language>,
+    /// In which unit lengths are written.
+    lengths: Lengths,
     /// How numbers become colours.
     scales: (Colours, Ranges),
     /// Whether the theme has been put on.
@@ -250,13 +255,15 @@ impl Desk {
     pub(crate) fn read(file: Option<PathBuf>) -> Self {
         let kept: Option<Kept> = file.as_deref().and_then(kept::read);
         let kept = kept.filter(|k| k.schema == SCHEMA);
-        let (chosen, theme, language, scales, laid) = kept.map_or_else(Default::default, |k| {
+        let (chosen, theme, words, scales, laid) = kept.map_or_else(Default::default, |k| {
             let of = |kept: Option<KeptLayout>, workspace| Laid::of(kept?, workspace);
             let expert = of(k.expert, Workspace::Expert);
             let laid = [of(k.inspector, Workspace::Inspector), expert];
-            (k.chosen, k.theme.into(), k.language, (k.colours, k.ranges), laid)
+            let words = (k.language, k.lengths);
+            (k.chosen, k.theme.into(), words, (k.colours, k.ranges), laid)
         });
-        Self { chosen, shown: chosen, theme, language, scales, laid, file, ..Self::default() }
+        let (shown, (language, lengths)) = (chosen, words);
+        Self { chosen, shown, theme, language, lengths, scales, laid, file, ..Self::default() }
     }
 
     fn write(&self) {
@@ -264,8 +271,10 @@ impl Desk {
         let [inspector, expert] = &self.laid;
         let [inspector, expert] = [inspector, expert].map(|l| l.as_ref().map(Laid::kept));
         let (schema, chosen, theme) = (SCHEMA.into(), self.chosen, self.theme.into());
-        let (language, (colours, ranges)) = (self.language, self.scales.clone());
-        let kept = Kept { schema, chosen, theme, language, colours, ranges, inspector, expert };
+        let (language, lengths) = (self.language, self.lengths);
+        let (colours, ranges) = self.scales.clone();
+        let kept =
+            Kept { schema, chosen, theme, language, lengths, colours, ranges, inspector, expert };
         kept::write(file, "the layout was", &kept);
     }
 
@@ -300,6 +309,16 @@ impl Desk {
     /// The language that the user has chosen; none: as the system has it.
     pub(crate) fn language(&self) -> Option<Language> {
         self.language
+    }
+
+    /// One unit of lengths, from now on.
+    pub(crate) fn measure_in(&mut self, lengths: Lengths) {
+        (self.lengths, self.is_changed) = (lengths, true);
+    }
+
+    /// In which unit lengths are written.
+    pub(crate) fn lengths(&self) -> Lengths {
+        self.lengths
     }
 
     /// How numbers became colours when that was last kept.
@@ -492,10 +511,13 @@ fn settled(laid: Option<Laid>, workspace: Workspace, panels: &[Panel], width: f3
     laid
 }
 
-/// Speaks the language that was chosen, else the system's.
+/// Speaks the language that was chosen, else the system's, and writes lengths in the unit that was
+/// chosen.
 pub(crate) fn speak(world: &World) {
     let system = world.resource::<SystemLanguage>().0;
-    lang::speak(world.resource::<Desk>().language().unwrap_or(system));
+    let desk = world.resource::<Desk>();
+    lang::speak(desk.language().unwrap_or(system));
+    lengths::choose(desk.lengths());
 }
 
 /// Puts the theme on, once it is another one; small print is to be read without a lens.
@@ -674,6 +696,22 @@ mod tests {
         std::fs::write(&file, text.replace("  \"language\": \"german\",\n", "")).unwrap();
         let again = Desk::read(Some(file));
         assert_eq!((again.language(), again.shown()), (None, Workspace::Expert));
+    }
+
+    #[test]
+    fn a_unit_of_lengths_is_kept_and_a_file_without_one_has_metres() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("layout.json");
+        let mut desk = Desk::read(Some(file.clone()));
+        assert_eq!(desk.lengths(), Lengths::Metres);
+        desk.measure_in(Lengths::FeetAndInches);
+        desk.write();
+        assert_eq!(Desk::read(Some(file.clone())).lengths(), Lengths::FeetAndInches);
+        let text = std::fs::read_to_string(&file).unwrap();
+        let without = text.replace("  \"lengths\": \"feet_and_inches\",\n", "");
+        assert_ne!(without, text);
+        std::fs::write(&file, without).unwrap();
+        assert_eq!(Desk::read(Some(file)).lengths(), Lengths::Metres);
     }
 
     #[test]

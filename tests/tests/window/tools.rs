@@ -5,34 +5,41 @@ use std::{fs, path::Path};
 use bevy_ecs::world::World;
 use egui::{Key, Modifiers};
 use egui_kittest::kittest::{NodeT, Queryable};
+use glam::Vec3;
 use intrados_forecast::ForecastSettings;
 use intrados_light::Render;
 use intrados_mechanics::plugin::{Analyses, ShownAt};
-use intrados_panels::{Action, Latest, Log, PanelsPlugin, Selection, Viewpoint};
+use intrados_panels::{Action, Latest, Lengths, Log, PanelsPlugin, Refine, Selection, Viewpoint};
 use intrados_predict::{PredictSettings, Predicting};
 use intrados_scene::{Camera, plugin::CurrentScene};
 use intrados_stage::Work;
 
-use super::{LONELY, Window, press, rest, type_into, with_column, with_lonely};
+use super::{LONELY, Window, export, press, rest, type_into, with_column, with_lonely};
 
 /// Whether anything in the window has this text in its name.
 fn has(window: &Window, text: &str) -> bool {
     window.harness.query_all_by_label_contains(text).next().is_some()
 }
 
-/// Two clicks on members are a distance with its unit, and select nothing.
-#[test]
-fn the_tape_reads_between_two_clicks() {
-    let mut window = with_column();
+/// Two places in the structure's picture that members are at, as far apart as may be along its
+/// middle.
+fn ends(window: &mut Window) -> (egui::Pos2, egui::Pos2) {
     let rect = window.harness.get_by_label("Damage of members").rect();
     let places: Vec<egui::Pos2> = (1..40)
         .map(|k| rect.lerp_inside(egui::vec2(k as f32 / 40.0, 0.5)))
         .filter(|at| {
-            press(&mut window, *at);
+            press(window, *at);
             window.with(|w| w.resource::<Selection>().0.is_some())
         })
         .collect();
-    let (first, last) = (places[0], places[places.len() - 1]);
+    (places[0], places[places.len() - 1])
+}
+
+/// Two clicks on members are a distance with its unit, and select nothing.
+#[test]
+fn the_tape_reads_between_two_clicks() {
+    let mut window = with_column();
+    let (first, last) = ends(&mut window);
     window.ask(Action::Select(None));
     window.frames(2);
     window.click("Measure");
@@ -44,6 +51,116 @@ fn the_tape_reads_between_two_clicks() {
     assert_eq!(window.with(|w| *w.resource::<Selection>()), Selection(None));
     window.click("Clear the tape");
     assert!(has(&window, "Click the first place"));
+}
+
+/// The tape reads in metres, millimetres or feet and inches, always with the unit.
+#[test]
+fn lengths_are_written_in_the_unit_that_was_chosen() {
+    let mut window = with_column();
+    let places = ends(&mut window);
+    window.click("Measure");
+    press(&mut window, places.0);
+    press(&mut window, places.1);
+    let read = |window: &mut Window, lengths: Lengths| {
+        window.ask(Action::Lengths(lengths));
+        window.frames(3);
+        said(window, " level, ").remove(0)
+    };
+    let first = |text: &str| -> f64 {
+        text.split(' ').next().and_then(|n| n.parse().ok()).unwrap_or(f64::NAN)
+    };
+    let [metres, millimetres, feet] =
+        [Lengths::Metres, Lengths::Millimetres, Lengths::FeetAndInches]
+            .map(|lengths| read(&mut window, lengths));
+    let scale = if metres.split(' ').nth(1) == Some("m") { 1e3 } else { 1.0 };
+    assert!((scale * first(&metres) - first(&millimetres)).abs() < 6.0, "{metres} {millimetres}");
+    assert!(millimetres.contains(" mm (") && !millimetres.contains(" m "), "{millimetres}");
+    assert!(feet.contains(" in (") && !feet.contains(" m"), "{feet}");
+}
+
+/// Through a tunnel the camera flies along its axis and halts where it is told to; however it ends,
+/// one is where one was.
+#[test]
+fn a_flight_through_a_tunnel_ends_where_it_began() {
+    let mut window = with_lining();
+    let keep = |window: &mut Window, name: &str| {
+        window.ask(Action::KeepView(name.into()));
+        window.frames(2);
+    };
+    keep(&mut window, "before");
+    window.click("Fly through");
+    window.frames(4);
+    let first = chainage(&window);
+    window.frames(4);
+    let second = chainage(&window);
+    assert!(first > 0.0 && second > first && second < 6.0, "{first} {second}");
+    window.harness.key_press(Key::Space);
+    window.frames(2);
+    let here = chainage(&window);
+    window.frames(5);
+    assert_eq!(chainage(&window), here, "it has been told to halt");
+    assert!(!window.with(|w| w.resource::<Refine>().paused), "it is the light that was paused");
+    keep(&mut window, "inside");
+    window.click("▶ Fly on");
+    flown_out(&mut window);
+    keep(&mut window, "at its end");
+    window.click("Fly through");
+    window.frames(4);
+    assert!(has(&window, "chainage "));
+    window.harness.key_press(Key::Escape);
+    window.frames(2);
+    assert!(!has(&window, "chainage "), "Escape has not ended it");
+    assert!(window.with(|w| w.resource::<Selection>().0.is_some()), "only the flight is put away");
+    keep(&mut window, "broken off");
+    let views = [0, 1, 2, 3].map(|index| view(&mut window, index));
+    let place = |camera: &Camera| (camera.position, camera.target, camera.up, camera.fov_deg);
+    let [before, inside, at_its_end, broken_off] = &views;
+    assert_eq!((place(at_its_end), place(broken_off)), (place(before), place(before)));
+    let ahead = (inside.target - inside.position).normalize();
+    assert!(inside.position.truncate().length() < 2.7 && ahead.distance(Vec3::Z) < 1e-4);
+    assert!((f64::from(inside.position.z) + 6.0 - here).abs() < 0.01, "{inside:?} {here}");
+}
+
+/// An inspector's window with the bundled tunnel, whose lining is selected.
+fn with_lining() -> Window {
+    let mut window = Window::new(|app| {
+        app.world_mut().resource_mut::<Predicting>().settings =
+            PredictSettings { forecast: None, ..PredictSettings::default() };
+    });
+    window.ask(Action::Open("tunnel".into()));
+    window.until("a scene with light", |w| {
+        w.contains_resource::<CurrentScene>() && w.resource::<Viewpoint>().camera().is_some()
+    });
+    let lining =
+        window.with(|w| w.resource::<CurrentScene>().0.members.iter().position(|m| m.id == "T1"));
+    window.ask(Action::Select(lining));
+    window.frames(4);
+    window
+}
+
+/// Where a flight is, m; NaN: there is none.
+fn chainage(window: &Window) -> f64 {
+    let said = said(window, "chainage ");
+    let number = said.first().and_then(|text| text.split(' ').nth(1)?.parse().ok());
+    number.unwrap_or(f64::NAN)
+}
+
+/// Frames until the flight is over, which are a quarter of a second long.
+fn flown_out(window: &mut Window) {
+    for _ in 0..200 {
+        if !has(window, "chainage ") {
+            return;
+        }
+        window.frame();
+    }
+    panic!("after fifty seconds it still flies");
+}
+
+/// A view that was kept, by its place among them.
+fn view(window: &mut Window, index: usize) -> Camera {
+    window.ask(Action::View(index));
+    window.frames(2);
+    window.with(|w| w.resource::<Viewpoint>().camera().cloned()).expect("a camera")
 }
 
 /// What a section takes away is neither seen nor picked, and is there again without it.
@@ -396,6 +513,45 @@ fn a_line_over_the_picture_of_light_has_values_with_errors() {
     window.harness.key_press(Key::Escape);
     window.frames(2);
     assert!(!has(&window, "along the line"));
+}
+
+/// The smoothed preview is marked, and neither what the inspector reads nor what is exported knows of
+/// it.
+#[test]
+fn a_smoothed_preview_is_for_the_eye_alone() {
+    let mut window = Window::with_scene("cornell");
+    // Of one side, so that nothing hangs on how both are weighted meanwhile.
+    window.click("Primal");
+    window.until("some light", |w| w.resource::<Render>().samples_per_pixel() > 8.0);
+    window.click("⏸ Pause");
+    window.frames(20);
+    let folder = tempfile::tempdir().expect("a folder");
+    let rect = window.harness.get_by_label("Picture").rect();
+    let seen = |window: &mut Window| {
+        window.harness.hover_at(egui::pos2(640.0, 4.0));
+        window.frames(6);
+        columns(&window.picture(), rect)
+    };
+    let told = |window: &mut Window, name: &str| {
+        window.harness.hover_at(rect.center());
+        window.frames(3);
+        let mut numbers = said(window, " W/(m² sr)");
+        numbers.retain(|text| !text.starts_with("Mean"));
+        let file = folder.path().join(name);
+        export(window, &file);
+        (numbers, fs::read(&file).expect("a picture"))
+    };
+    let (plain, numbers) = (seen(&mut window), told(&mut window, "plain.png"));
+    assert!(!numbers.0.is_empty(), "the inspector reads nothing");
+    window.click("Smoothed preview");
+    window.until_seen("smoothed: not for measuring");
+    let smoothed = seen(&mut window);
+    let others = smoothed.iter().zip(&plain).filter(|(a, b)| a != b).count();
+    assert!(others > plain.len() / 2, "only {others} columns have changed");
+    assert!(told(&mut window, "smoothed.png") == numbers, "a number or a file has changed");
+    window.click("Smoothed preview");
+    assert!(!has(&window, "smoothed: not for measuring"));
+    assert!(seen(&mut window) == plain, "it is not as it was");
 }
 
 /// Columns of what is seen there.

@@ -282,11 +282,8 @@ impl Law {
                 };
                 let (local, crack) = (response.local.0, response.crack_width);
                 let strained = moment.nonlocal.unwrap_or(local);
-                let record = Record {
-                    state: response.state,
-                    strained,
-                    excess: response.excess.max(0.0),
-                };
+                let record =
+                    Record { state: response.state, strained, excess: response.excess.max(0.0) };
                 Answer {
                     stress: response.stress,
                     tangent: response.tangent,

@@ -4,7 +4,7 @@ use egui::{Align2, Color32, Rect, Ui, vec2};
 use glam::Vec3;
 use intrados_scene::Camera;
 
-use crate::{colours, lang::fixed, surface::place};
+use crate::{colours, lengths::length, surface::place};
 
 /// The tape, and the places that it lies between.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -72,17 +72,6 @@ fn reading(a: Vec3, b: Vec3) -> String {
     tr!("{} ({} level, {} upright)", length(d.length()), length(level), length(d.y.abs()))
 }
 
-/// m, as it is read on a drawing: millimetres, from 10 m on centimetres.
-fn length(m: f32) -> String {
-    if m < 1.0 {
-        format!("{} mm", fixed(1e3 * m, 0))
-    } else if m < 10.0 {
-        format!("{} m", fixed(m, 3))
-    } else {
-        format!("{} m", fixed(m, 2))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -97,6 +86,5 @@ mod tests {
         tape.put(Vec3::ZERO);
         tape.put(Vec3::new(0.25, 0.0, 0.0));
         assert_eq!(tape.said(), "250 mm (250 mm level, 0 mm upright)");
-        assert_eq!(length(12.345), "12.35 m");
     }
 }

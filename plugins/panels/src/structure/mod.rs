@@ -1,6 +1,7 @@
 //! The Structure panel: all members in space, coloured by damage. A click goes to a member's sheet.
 
 mod compass;
+mod flight;
 mod measure;
 mod model;
 mod section;
@@ -12,6 +13,7 @@ use std::sync::Arc;
 
 use bevy_ecs::prelude::*;
 use egui::{Rect, Ui, vec2};
+use flight::Flight;
 use glam::Vec3;
 use intrados_scene::{Camera, Scene, plugin::CurrentScene};
 use intrados_stage::Jobs;
@@ -70,6 +72,9 @@ pub(crate) struct Structure {
     /// Whether it is shown as it looks, not by its damage.
     is_lit: bool,
     settling: Settling,
+    /// A flight is to begin once there is a picture to begin it from.
+    takes_off: bool,
+    flight: Option<Flight>,
 }
 
 impl Default for Structure {
@@ -85,6 +90,8 @@ impl Default for Structure {
             followed: None,
             is_lit: false,
             settling: Settling::default(),
+            takes_off: false,
+            flight: None,
         }
     }
 }
@@ -99,9 +106,11 @@ impl Structure {
         self.followed.as_ref().map(|(_, camera)| camera).or(self.model.camera())
     }
 
-    /// Looks at the scene from there, whatever else was wished before.
+    /// Looks at the scene from there, whatever else was wished before; whoever goes
+    /// elsewhere flies no more.
     pub(crate) fn follow(&mut self, scene: &Scene, camera: &Camera) {
         self.wished = None;
+        self.flight = None;
         self.followed = Some((scene.hash.clone(), camera.clone()));
     }
 
@@ -117,10 +126,62 @@ impl Structure {
             self.earlier.follow(&camera);
         }
         if let Some(view) = self.wished.take() {
+            self.end_flight();
             let member = member.filter(|_| view == View::Framed);
             self.model.go(view, scene, member);
             self.model.camera().iter().for_each(|camera| self.earlier.follow(camera));
         }
+    }
+
+    fn aim(&mut self, camera: &Camera) {
+        self.model.follow(camera);
+        self.earlier.follow(camera);
+    }
+
+    pub(crate) fn is_flying(&self) -> bool {
+        self.flight.is_some()
+    }
+
+    /// Begins a flight along the selected member; one that goes on halts, and one that has halted
+    /// goes on.
+    pub(crate) fn fly_or_halt(&mut self) {
+        match &mut self.flight {
+            Some(flight) => flight.halt(),
+            None => self.takes_off = true,
+        }
+    }
+
+    /// Ends a flight where it began; whether there was one.
+    pub(crate) fn end_flight(&mut self) -> bool {
+        let flight = self.flight.take();
+        flight.iter().for_each(|flight| self.aim(flight.home()));
+        flight.is_some()
+    }
+
+    /// Begins the flight that was asked for, and takes the camera along on the one that there is.
+    fn fly(&mut self, ui: &Ui, scene: &Scene, selection: Selection) {
+        if self.model.shows(scene) && std::mem::take(&mut self.takes_off) {
+            self.flight = self.take_off(scene, selection.0);
+        }
+        let Some(flight) = &mut self.flight else { return self.model.fly(false) };
+        flight.go_on(ui.input(|i| i.time));
+        if flight.is_over(scene) {
+            self.end_flight();
+            return self.model.fly(false);
+        }
+        // Only while it moves are frames asked for.
+        let (plays, camera) = (flight.plays, flight.camera());
+        if plays {
+            ui.ctx().request_repaint();
+        }
+        camera.iter().for_each(|camera| self.aim(camera));
+        self.model.fly(plays);
+    }
+
+    fn take_off(&self, scene: &Scene, member: Option<usize>) -> Option<Flight> {
+        let (member, home) = (member?, self.model.camera()?);
+        let triangles: Vec<[Vec3; 3]> = self.model.triangles(member).collect();
+        Flight::along(scene, member, &triangles, home)
     }
 
     /// Where the evidence is that a form asks for.
@@ -176,6 +237,7 @@ pub(crate) fn structure(
     let history = history.bypass_change_detection();
     let structure = structure.bypass_change_detection();
     structure.go(scene, selection.0, history.beside().is_some());
+    structure.fly(ui, scene, *selection);
     let section = structure.section;
     // What is cut open, or compared, is not as it looks.
     let is_lit = structure.is_lit && section.is_none() && history.beside().is_none();
@@ -208,6 +270,9 @@ pub(crate) fn structure(
     structure.place = structure.place.filter(|_| form.is_open);
     let pointed = structure.model.show(ui, rect, scene, coloured, scale, *selection, section, jobs);
     let Some(pointed) = pointed else { return };
+    if pointed.response.dragged() {
+        structure.flight.iter_mut().for_each(Flight::rest);
+    }
     if is_lit {
         structure.settling.show(ui, rect, &pointed.camera, &mut light);
     }
@@ -231,6 +296,11 @@ pub(crate) fn structure(
             let timeline = &courses.timeline;
             let time = (&mut moment, timeline, play.is_on);
             tools(ui, structure, history, *selection, time, &mut actions);
+            if is_lit {
+                let frame = egui::Frame::popup(ui.style()).inner_margin(4);
+                frame.show(ui, |ui| light.tools(ui));
+            }
+            flown(ui, structure, scene, *selection, &mut actions);
         });
     });
 }
@@ -377,6 +447,30 @@ fn tools(
                 }
             })
         });
+    }
+}
+
+/// The flight that there is; of a tunnel that is selected, how to begin one.
+fn flown(
+    ui: &mut Ui,
+    structure: &mut Structure,
+    scene: &Scene,
+    selection: Selection,
+    actions: &mut Actions,
+) {
+    let frame = egui::Frame::popup(ui.style()).inner_margin(4);
+    let member = selection.0.and_then(|index| scene.members.get(index));
+    if let Some(flight) = &mut structure.flight {
+        let ends = frame.show(ui, |ui| ui.horizontal(|ui| flight.tools(ui)).inner).inner;
+        if ends {
+            structure.end_flight();
+        }
+    } else if member.is_some_and(|m| flight::is_tunnel(m.kind)) {
+        let hint = tr!("Along its axis in some twenty seconds, and back to where one was");
+        let button = frame.show(ui, |ui| ui.button(tr!("Fly through"))).inner;
+        if button.on_hover_text(hint).clicked() {
+            actions.ask(Action::Fly);
+        }
     }
 }
 

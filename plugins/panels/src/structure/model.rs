@@ -9,10 +9,14 @@ use intrados_scene::{Camera, Scene};
 use intrados_stage::{Jobs, Task, alone};
 use rayon::prelude::*;
 
-use super::{section::Section, spot::Spot};
+use super::{
+    section::{self, Section},
+    spot::Spot,
+};
 use crate::{
     Latest, Selection, colours,
     lang::{fixed, local, term},
+    lengths,
     moment::{Seen, place as place_of},
     number::plus_minus,
     orbit,
@@ -85,6 +89,8 @@ pub(super) struct Model {
     shown: Option<Shown>,
     /// The member along which a place is dragged: there, the camera stays.
     slides: Option<usize>,
+    /// The camera flies by itself: what is drawn is gone in the next frame.
+    flies: bool,
     /// The fine picture that is being drawn, and what of.
     coming: Option<(Key, Task<Painted>)>,
 }
@@ -195,7 +201,7 @@ impl Model {
         let slides = response.dragged() && self.slides.is_some();
         let slides = slides && begun.map(|spot| spot.member) == self.slides;
         let camera = if slides { camera } else { hand(ui, &response, rect, camera) };
-        let is_moving = response.dragged() || camera != before;
+        let is_moving = response.dragged() || camera != before || self.flies;
         self.camera = Some(camera.clone());
         let members = self.facets.iter().map(|f| f.member + 1).max().unwrap_or(0);
         let of = |member: usize| seen.get(member).copied().unwrap_or_default();
@@ -238,6 +244,21 @@ impl Model {
     /// From now on a place is dragged along this member, or along none.
     pub(super) fn slide(&mut self, along: Option<usize>) {
         self.slides = along;
+    }
+
+    /// Whether the camera flies by itself.
+    pub(super) fn fly(&mut self, flies: bool) {
+        self.flies = flies;
+    }
+
+    /// Whether it has shown this scene.
+    pub(super) fn shows(&self, scene: &Scene) -> bool {
+        self.camera.is_some() && self.of == scene.hash
+    }
+
+    /// The surface of a member.
+    pub(super) fn triangles(&self, member: usize) -> impl Iterator<Item = [Vec3; 3]> {
+        self.facets.iter().filter(move |f| f.member == member).map(|f| f.corners)
     }
 
     /// Whether it is looked at from very far.
@@ -408,6 +429,7 @@ impl Model {
                 Some(section) => Arc::new(section.cut(&whole, bounds)),
                 None => whole,
             };
+            let facets = section::before(facets, &key.camera);
             let values: Vec<f32> = facets.iter().flat_map(|f| [key.value(f); 3]).collect();
             let positions: Vec<Vec3> = facets.iter().flat_map(|f| f.corners).collect();
             let faces: Vec<[u32; 4]> = (0..facets.len() as u32)
@@ -580,15 +602,8 @@ pub(super) fn ruler(ui: &Ui, rect: Rect, camera: &Camera) {
     let width = 2.0 * camera.half_extent()[0] * distance;
     let metre = rect.width() / width.max(1e-6);
     // The largest round length that takes less than a fifth of the picture.
-    let most = 0.2 * rect.width() / metre;
-    let power = 10_f32.powf(most.log10().floor());
-    let length = [5.0, 2.0, 1.0].map(|k| k * power).into_iter().find(|l| *l <= most);
-    let Some(length) = length.filter(|l| l.is_finite()) else { return };
-    let text = if length < 1.0 {
-        tr!("{} mm at the middle", fixed(1e3 * length, 0))
-    } else {
-        tr!("{} m at the middle", fixed(length, 0))
-    };
+    let Some(length) = lengths::round_within(0.2 * rect.width() / metre) else { return };
+    let text = tr!("{} at the middle", lengths::rounded(length));
     let ink = ui.visuals().text_color();
     let left = rect.left_bottom() + vec2(14.0, -14.0);
     let right = left + vec2(length * metre, 0.0);

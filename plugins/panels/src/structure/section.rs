@@ -1,13 +1,19 @@
 //! A plane that cuts the structure open, so that one can look into it.
 
+use std::sync::Arc;
+
 use egui::Ui;
 use glam::Vec3;
 use intrados_report::surface::Facet;
+use intrados_scene::Camera;
 
 use crate::lang::{slide, term};
 
 /// Directions that planes may be across, by what an engineer calls them.
 const AXES: [(&str, Vec3); 3] = [("x", Vec3::X), ("height", Vec3::Y), ("z", Vec3::Z)];
+
+/// How far before the eye drawing begins, of the distance to what is looked at.
+const NEAR: f32 = 1e-2;
 
 /// Where the structure is cut.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -69,6 +75,18 @@ impl Section {
     }
 }
 
+/// What of the facets lies before the eye. One that reaches behind it could not be drawn as it is: to
+/// who stands in a tunnel the walls would be missing up to the end of the zone that he is in.
+pub(super) fn before(facets: Arc<Vec<Facet>>, camera: &Camera) -> Arc<Vec<Facet>> {
+    let [_, _, forward] = camera.frame();
+    let near = NEAR * (camera.target - camera.position).length();
+    let above = |p: Vec3| (p - camera.position).dot(forward) - near;
+    if facets.iter().all(|f| f.corners.iter().all(|p| above(*p) >= 0.0)) {
+        return facets;
+    }
+    Arc::new(facets.iter().flat_map(|f| clipped(f, above)).collect())
+}
+
 /// The triangles of a facet where `above` is not negative (Sutherland and Hodgman 1974).
 fn clipped(facet: &Facet, above: impl Fn(Vec3) -> f32) -> Vec<Facet> {
     let heights = facet.corners.map(&above);
@@ -100,6 +118,24 @@ mod tests {
             0.5 * (b - a).cross(c - a).length()
         };
         facets.iter().map(of).sum()
+    }
+
+    #[test]
+    fn of_what_reaches_behind_the_eye_that_is_left_which_lies_before_it() {
+        let corners =
+            [Vec3::new(-1.0, 1.0, -4.0), Vec3::new(1.0, 1.0, -4.0), Vec3::Y + 4.0 * Vec3::Z];
+        let facets = Arc::new(vec![Facet { corners, member: 2, zone: 1 }]);
+        let from = |z: f32| Camera {
+            position: Vec3::Z * z,
+            target: Vec3::Z * (z - 1.0),
+            ..Camera::overview([Vec3::ZERO, Vec3::ONE])
+        };
+        assert!(Arc::ptr_eq(&before(Arc::clone(&facets), &from(5.0)), &facets), "all is before it");
+        let half = before(Arc::clone(&facets), &from(0.0));
+        assert!(half.iter().all(|f| f.corners.iter().all(|p| p.z <= -NEAR + 1e-5)));
+        // Of a triangle that is cut in the middle of its height, three quarters are at its foot.
+        assert!((area(&half) / area(&facets) - 0.75).abs() < 0.01, "{}", area(&half));
+        assert!(before(facets, &from(-5.0)).is_empty());
     }
 
     #[test]

@@ -2,10 +2,15 @@
 //! over its preview as its error falls.
 
 use bevy_ecs::{prelude::*, system::SystemParam};
-use egui::{Align2, Color32, Rect, TextStyle, Ui, pos2, vec2};
+use egui::{Align2, Color32, Rect, TextStyle, TextureHandle, Ui, pos2, vec2};
 use intrados_scene::Camera;
 
-use crate::{Look, Quantity, Statistics, Viewpoint, number::percent, picture::Picture};
+use crate::{
+    Look, Quantity, Statistics, Viewpoint,
+    number::percent,
+    picture::Picture,
+    smooth::{self, Smoothed},
+};
 
 /// Relative standard error of a pixel at which nothing of the preview shows through.
 const SETTLED: f64 = 0.25;
@@ -15,6 +20,7 @@ const SETTLED: f64 = 0.25;
 pub(crate) struct Light<'w> {
     viewpoint: ResMut<'w, Viewpoint>,
     picture: ResMut<'w, Picture>,
+    smoothed: ResMut<'w, Smoothed>,
     statistics: Res<'w, Statistics>,
     look: Res<'w, Look>,
 }
@@ -25,6 +31,13 @@ pub(super) struct Settling {
     asked: Option<Camera>,
     /// Where the structure was looked at from in the last frame.
     before: Option<Camera>,
+}
+
+impl Light<'_> {
+    /// The row that says whether it is smoothed.
+    pub(super) fn tools(&mut self, ui: &mut Ui) {
+        smooth::switch(ui, self.smoothed.bypass_change_detection());
+    }
 }
 
 impl Settling {
@@ -54,13 +67,16 @@ impl Settling {
             return;
         }
         let noise = now.pixel_noise();
-        let Some(texture) = light.picture.bypass_change_detection().texture(ui.ctx()) else {
-            return;
-        };
+        let smoothed = light.smoothed.bypass_change_detection().texture(ui.ctx());
+        let plain = light.picture.bypass_change_detection().texture(ui.ctx());
+        let Some(texture) = smoothed.or(plain.map(TextureHandle::id)) else { return };
         let share = if noise.is_finite() { (SETTLED / noise).min(1.0) } else { 0.0 };
         let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
         let ink = Color32::from_white_alpha((255.0 * share) as u8);
-        ui.painter().image(texture.id(), rect, whole, ink);
+        ui.painter().image(texture, rect, whole, ink);
+        if smoothed.is_some() {
+            smooth::mark(ui, rect);
+        }
         let said = match noise.is_finite() {
             true => tr!("light, a pixel ± {}", percent(noise)),
             false => tr!("light is on its way"),
