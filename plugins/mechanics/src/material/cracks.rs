@@ -355,7 +355,8 @@ struct Found {
 
 impl Concrete {
     /// [`Concrete::respond`] with [`super::law::Cracks::Planes`]; with a `growth`, that share of
-    /// what each plane was asked for beyond its damage becomes damage, whatever the strain is now.
+    /// what each plane and what presses was asked for beyond its damage becomes damage, whatever
+    /// the strain is now, and planes that have cracked do not turn: what is left is almost linear.
     #[must_use]
     pub(crate) fn respond_cracked(
         &self,
@@ -473,7 +474,8 @@ impl Concrete {
                 ..*state
             },
             local: (asked, ZERO),
-            excess: 0.0,
+            bears,
+            crushes: 0.0,
             by_nonlocal: ZERO,
             crack_width: 0.0,
             crack_normal: SOUND.axes[0],
@@ -596,9 +598,8 @@ impl Concrete {
                 ..**state
             },
             local: (found.asked[worst], ZERO),
-            excess: (found.asked[worst] / bears[worst])
-                .max(pressed / crushed_by.max(compression.threshold))
-                - 1.0,
+            bears: bears[worst],
+            crushes: pressed / crushed_by.max(compression.threshold) - 1.0,
             by_nonlocal: ZERO,
             crack_width: found.cracked.opening[widest] * bands[widest],
             crack_normal: axes[widest],
@@ -899,7 +900,7 @@ mod tests {
         let born = law.born(0.0, 28.0 * DAY);
         let strain = [3e-4, 0.0, 0.0, 0.0, 0.0, 0.0];
         let held = law.respond_cracked(&strain, Some(0.0), &born, &NOW);
-        assert!(held.state.damage[0] == 0.0 && held.excess > 0.0);
+        assert!(held.state.damage[0] == 0.0 && held.local.0 > held.bears);
         let given = law.respond_cracked(&strain, Some(1.0), &held.state, &NOW).state;
         assert!(
             (given.planes.kappa[0] / held.local.0 - 1.0).abs() < 1e-12 && given.damage[0] > 0.5

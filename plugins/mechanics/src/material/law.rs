@@ -200,9 +200,12 @@ pub(crate) struct Response {
     pub state: State,
     /// Local equivalent strain of tension, and its derivative by the strain (exact without creep).
     pub local: Equivalent,
-    /// By what share the strain it is asked for is beyond what its damage, or its strength, can
-    /// carry; at most zero (to rounding) where damage is found.
-    pub excess: f64,
+    /// Equivalent strain that damage of tension stands for, or that of the strength where there is
+    /// none.
+    pub bears: f64,
+    /// By what share the strain that crushes is beyond what a given damage of compression stands
+    /// for; at most zero where damage is found.
+    pub crushes: f64,
     /// ∂σ/∂(non-local equivalent strain), Pa; zero while damage does not grow and for the local
     /// law.
     pub by_nonlocal: Voigt,
@@ -446,7 +449,8 @@ impl Concrete {
                 found.local.0,
                 tensor::scale(&self.elastic.by_strain(split, found.local.1), clock.stiffening),
             ),
-            excess: nonlocal.unwrap_or(found.local.0) / kappa[0].max(tension.threshold) - 1.0,
+            bears: kappa[0].max(tension.threshold),
+            crushes: 0.0,
             by_nonlocal: tensor::scale(&self.elastic.by_tension(split), slope),
             // Principal strains come largest first, and stresses in the same order.
             crack_width: opening[0]

@@ -142,7 +142,7 @@ pub(super) struct Moment {
     pub(super) edges: Edges,
     /// Cracks that its bars keep apart, along each axis, 1/m.
     pub(super) bars: [f64; 3],
-    /// Of the excess of the last equilibrium so much becomes damage of tension, whatever the strain
+    /// Of the excess of the last equilibrium so much becomes damage, whatever the strain
     /// is now; none: damage is found.
     pub(super) growth: Option<f64>,
     /// Non-local strain, which then drives damage of tension.
@@ -282,8 +282,8 @@ impl Law {
                 };
                 let (local, crack) = (response.local.0, response.crack_width);
                 let strained = moment.nonlocal.unwrap_or(local);
-                let record =
-                    Record { state: response.state, strained, excess: response.excess.max(0.0) };
+                let excess = (strained / response.bears - 1.0).max(response.crushes).max(0.0);
+                let record = Record { state: response.state, strained, excess };
                 Answer {
                     stress: response.stress,
                     tangent: response.tangent,

@@ -122,15 +122,11 @@ pub struct Step {
 /// over the stiffness of what is joined (a ring of .45 m at 3 m: 1.5 GPa/m, the cushion 10): a
 /// factor of some .07 an iteration, most of which the acceleration takes back.
 const HOLD: f64 = 0.01;
-/// Part of a step from which on cracks that jump are followed one by one.
-const JUMP: f64 = 1.0;
 /// By so much the most excessive strain may outgrow its damage between two equilibria of an
 /// avalanche: all others grow in proportion.
 const GROWTH: f64 = 1.0;
 /// Excess below which the iteration is tried again.
 const CALM: f64 = 0.1;
-/// Excess at which given damage is what would be found.
-const SETTLED: f64 = 0.01;
 /// [`Goal::patience`] of a first attempt, which an avalanche can replace.
 const PATIENCE: usize = 6;
 /// Tolerance of equilibria with given damage, which are but a way.
@@ -379,7 +375,7 @@ impl<'s, 'm> March<'s, 'm> {
             let amount = (next - done) * amount;
             let goal = Goal { time, amount, left, growth: None, patience: PATIENCE };
             let mut tried = way.attempt(history, &goal, job);
-            if matches!(tried, Ok(Err(_))) && part <= JUMP {
+            if matches!(tried, Ok(Err(_))) {
                 tried = way.avalanche(history, &goal, job);
             }
             match tried.map_err(|why| way.structure.labelled(why))? {
@@ -429,7 +425,8 @@ impl Way<'_, '_> {
         let found = Goal { amount: 0.0, growth: None, patience: PATIENCE, ..*goal };
         for equilibria in 1..=COLLAPSE {
             let excess = history.excess();
-            if excess < SETTLED {
+            // Given damage is as good as found.
+            if excess.max(step.residual) <= self.settings.tolerance {
                 return Ok(Ok((history, Step { avalanche: equilibria, ..step })));
             }
             if excess < calm {
