@@ -93,5 +93,7 @@ for page in sorted(SOURCE.glob("*.md")):
 if shutil.which("mdbook") and not faults:
     with tempfile.TemporaryDirectory() as out:
         subprocess.run(["mdbook", "build", "--dest-dir", out, SOURCE.parent], check=True)
+        # A block of code without a language counts as Rust.
+        subprocess.run(["mdbook", "test", SOURCE.parent], check=True)
 print("\n".join(faults) or f"{len(pages)} pages of the book hold" + ("" if shutil.which("mdbook") else "; mdBook is not installed and was not run"))
 sys.exit(bool(faults))

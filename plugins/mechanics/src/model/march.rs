@@ -26,6 +26,9 @@ pub struct MarchSettings {
     pub floor: f64,
     /// How often a step may be halved.
     pub cuts: u32,
+    /// Part of a step from which on cracks that jump are followed one by one (see `avalanche`): 1
+    /// where steps are short anyhow.
+    pub jump: f64,
     /// How linear systems are solved.
     pub method: Method,
     /// To which part of what is out of balance they are solved: no closer than an iteration of
@@ -47,6 +50,7 @@ impl Default for MarchSettings {
             loose: 1.0,
             floor: 0.0,
             cuts: 8,
+            jump: 0.25,
             method: Method::Auto,
             linear: 1e-8,
             work: f64::INFINITY,
@@ -375,7 +379,7 @@ impl<'s, 'm> March<'s, 'm> {
             let amount = (next - done) * amount;
             let goal = Goal { time, amount, left, growth: None, patience: PATIENCE };
             let mut tried = way.attempt(history, &goal, job);
-            if matches!(tried, Ok(Err(_))) {
+            if matches!(tried, Ok(Err(_))) && part <= way.settings.jump {
                 tried = way.avalanche(history, &goal, job);
             }
             match tried.map_err(|why| way.structure.labelled(why))? {

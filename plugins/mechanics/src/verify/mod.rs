@@ -198,6 +198,7 @@ const STRICT: MarchSettings = MarchSettings {
     loose: 1.0,
     floor: 0.0,
     cuts: 4,
+    jump: 0.25,
     method: crate::sparse::Method::Auto,
     linear: 1e-10,
     work: f64::INFINITY,
