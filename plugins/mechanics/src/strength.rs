@@ -152,8 +152,7 @@ const BUCKLES: f64 = 0.5;
 /// How equilibria are found while loads are raised, from how they are found in a life: many cracks
 /// grow in every step, and the last per mille costs most.
 pub(crate) fn settings(of_life: MarchSettings) -> MarchSettings {
-    let tolerance = of_life.tolerance.max(5e-3);
-    MarchSettings { tolerance, loose: 4.0, iterations: 40, jump: 1.0, ..of_life }
+    MarchSettings { tolerance: of_life.tolerance.max(5e-3), loose: 4.0, iterations: 40, ..of_life }
 }
 
 /// What is watched on the way.

@@ -37,6 +37,13 @@ pub(crate) fn scale(a: &Voigt, s: f64) -> Voigt {
     a.map(|x| x * s)
 }
 
+/// tangent · s.
+#[must_use]
+pub(crate) fn scale_tangent(mut tangent: Tangent, s: f64) -> Tangent {
+    tangent.as_flattened_mut().iter_mut().for_each(|c| *c *= s);
+    tangent
+}
+
 /// Stress · strain: work per volume, J/m³.
 #[must_use]
 pub(crate) fn dot(stress: &Voigt, strain: &Voigt) -> f64 {
@@ -63,8 +70,28 @@ pub(crate) fn stiffness(e: f64, nu: f64) -> Tangent {
     block(lambda + 2.0 * mu, lambda, mu)
 }
 
+/// Its stress of a strain.
+#[must_use]
+pub(crate) fn elastic_stress(e: f64, nu: f64, strain: &Voigt) -> Voigt {
+    let mu = e / (2.0 * (1.0 + nu));
+    let pressure = e * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)) * i1(strain);
+    let [x, y, z, xy, yz, zx] = *strain;
+    let normal = |e: f64| pressure + 2.0 * mu * e;
+    [normal(x), normal(y), normal(z), mu * xy, mu * yz, mu * zx]
+}
+
+/// Its strain of a stress, the inverse.
+#[must_use]
+pub(crate) fn elastic_strain(e: f64, nu: f64, stress: &Voigt) -> Voigt {
+    let (across, shear) = (nu * i1(stress), 2.0 * (1.0 + nu));
+    let [x, y, z, xy, yz, zx] = *stress;
+    let normal = |s: f64| (1.0 + nu) * s - across;
+    scale(&[normal(x), normal(y), normal(z), shear * xy, shear * yz, shear * zx], 1.0 / e)
+}
+
 /// The inverse of [`stiffness`], strain = C⁻¹ · stress.
 #[must_use]
+#[cfg(test)]
 pub(crate) fn compliance(e: f64, nu: f64) -> Tangent {
     block(1.0 / e, -nu / e, 2.0 * (1.0 + nu) / e)
 }
@@ -145,9 +172,13 @@ impl Principal {
     /// The stress with these principal values and directions.
     #[must_use]
     pub(crate) fn as_stress(&self) -> Voigt {
-        AXES.map(|(a, b)| {
-            (0..3).map(|i| self.values[i] * self.directions[i][a] * self.directions[i][b]).sum()
-        })
+        let mut stress = ZERO;
+        for (value, n) in self.values.iter().zip(&self.directions) {
+            for (s, (a, b)) in stress.iter_mut().zip(AXES) {
+                *s += value * n[a] * n[b];
+            }
+        }
+        stress
     }
 
     /// The strain with these principal values and directions.
@@ -215,9 +246,11 @@ pub fn rotate_stress(stress: &Voigt, frame: &Frame) -> Voigt {
     let half = frame.map(|[x, y, z]| {
         [x * xx + y * xy + z * zx, x * xy + y * yy + z * yz, x * zx + y * yz + z * zz]
     });
-    AXES.map(|(i, j)| {
-        half[i][0] * frame[j][0] + half[i][1] * frame[j][1] + half[i][2] * frame[j][2]
-    })
+    let mut turned = ZERO;
+    for (s, (i, j)) in turned.iter_mut().zip(AXES) {
+        *s = half[i][0] * frame[j][0] + half[i][1] * frame[j][1] + half[i][2] * frame[j][2];
+    }
+    turned
 }
 
 /// Components of a strain along the axes of `frame`.
@@ -230,13 +263,14 @@ pub(crate) fn rotate_strain(strain: &Voigt, frame: &Frame) -> Voigt {
 /// into the frame (Bond's matrix).
 #[must_use]
 pub(crate) fn rotate_tangent(local: &Tangent, frame: &Frame) -> Tangent {
-    let turn: Tangent = AXES.map(|(i, j)| {
+    let mut turn = [ZERO; 6];
+    for (row, (i, j)) in turn.iter_mut().zip(AXES) {
         let (a, b) = (frame[i], frame[j]);
         let shear = if i == j { 1.0 } else { 2.0 };
-        AXES.map(|(m, n)| {
-            if m == n { shear * a[m] * b[m] } else { 0.5 * shear * (a[m] * b[n] + a[n] * b[m]) }
-        })
-    });
+        for (t, (m, n)) in row.iter_mut().zip(AXES) {
+            *t = 0.5 * shear * (a[m] * b[n] + a[n] * b[m]);
+        }
+    }
     // Rows of C T, then of Tᵀ (C T).
     let (mut product, mut world) = ([ZERO; 6], [ZERO; 6]);
     for (row, weights) in product.iter_mut().zip(local) {
@@ -331,6 +365,17 @@ pub(crate) fn modified_von_mises(strain: &Voigt, k: f64, nu: f64) -> Equivalent 
 pub(crate) mod tests {
     use super::*;
     use intrados_stage::random::Key;
+
+    #[test]
+    fn elastic_stress_and_strain_are_those_of_the_matrices() {
+        for walk in 0..20 {
+            let (e, nu, v) = (30e9, 0.2, random(walk, 1e-3));
+            let stress = elastic_stress(e, nu, &v);
+            assert!(largest(&sub(&stress, &apply(&stiffness(e, nu), &v))) < 1e-12 * e * 1e-3);
+            assert!(largest(&sub(&elastic_strain(e, nu, &stress), &v)) < 1e-15);
+            assert!(largest(&sub(&apply(&compliance(e, nu), &stress), &v)) < 1e-15);
+        }
+    }
 
     #[test]
     fn the_least_principal_stress_is_that_of_the_axes() {

@@ -51,7 +51,10 @@ pub(crate) fn integrate(
         let (here, det) = along(nodes, natural, point, &axes)?;
         let middles = [0, 1, 2].map(|k| &middles[k][usize::from(natural[k] > 0.0)]);
         let rows = rows_of(&here, middles, &axes);
-        let strain = rows.map(|row| row.iter().zip(u).map(|(r, u)| r * u).sum());
+        let mut strain = tensor::ZERO;
+        for (e, row) in strain.iter_mut().zip(&rows) {
+            *e = row.iter().zip(u).map(|(r, u)| r * u).sum();
+        }
         // What the law says is turned, not the rows: it has fewer numbers.
         let (stress, tangent) = if is_turned {
             let (stress, tangent) = law(point, &tensor::rotate_strain(&strain, &world));

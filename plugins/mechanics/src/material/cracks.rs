@@ -440,16 +440,16 @@ impl Concrete {
             return None;
         }
         let crept = 1.0 + clock.creep(e);
-        let hooke = tensor::stiffness(e, nu);
+        let hooke = |strain: &Voigt| tensor::elastic_stress(e, nu, strain);
         let section = tensor::scale(effective, 1.0 / crept);
-        let stress = tensor::apply(&hooke, &section);
+        let stress = hooke(&section);
         let drive = tensor::scale(&section, e * clock.nonlinear);
         let delayed = tensor::scale(&tensor::sub(&drive, &state.drive), clock.increment.delayed);
         let creep = tensor::add(&tensor::add(&state.creep, past), &delayed);
         let share = tensor::scale(&creep, self.setting.creep_share);
-        let harms = tensor::apply(&hooke, &tensor::add(&section, &share));
+        let harms = hooke(&tensor::add(&section, &share));
         let asked = tensile(&harms, self.properties.fcm) / e;
-        let share = tensor::von_mises(&tensor::apply(&hooke, &share));
+        let share = tensor::von_mises(&hooke(&share));
         // A strain that is not finite is for the whole law to tell.
         if !(asked <= bears && clock.is_harmless(tensor::von_mises(&stress) + share)) {
             return None;
@@ -457,7 +457,7 @@ impl Concrete {
         let mechanical = tensor::sub(effective, &tensor::scale(&section, crept - 1.0));
         Some(Response {
             stress,
-            tangent: hooke.map(|row| tensor::scale(&row, clock.stiffening / crept)),
+            tangent: tensor::stiffness(e * clock.stiffening / crept, nu),
             state: State {
                 strain: *strain,
                 mechanical,
@@ -501,14 +501,10 @@ impl Concrete {
             true => cracked.rubbing(point, damage, shear),
         };
         let stress = tensor::rotate_stress(&cracked.stress, &tensor::transposed(axes));
-        let drive =
-            tensor::scale(&tensor::apply(&tensor::compliance(1.0, nu), &stress), clock.nonlinear);
+        let drive = tensor::scale(&tensor::elastic_strain(1.0, nu, &stress), clock.nonlinear);
         let delayed = tensor::scale(&tensor::sub(&drive, &state.drive), clock.increment.delayed);
         let creep = tensor::add(&tensor::add(&state.creep, &point.past), &delayed);
-        let share = tensor::apply(
-            &tensor::stiffness(e, nu),
-            &tensor::scale(&creep, self.setting.creep_share),
-        );
+        let share = tensor::elastic_stress(e, nu, &tensor::scale(&creep, self.setting.creep_share));
         let judged = tensor::add(&cracked.section, &tensor::rotate_stress(&share, axes));
         let most = judged[..3].iter().fold(0.0, |m: f64, s| m.max(*s));
         let value = if most > 0.0 { tensile(&judged, self.properties.fcm) / e } else { 0.0 };
@@ -568,7 +564,7 @@ impl Concrete {
         let widest = most(&|i| found.cracked.opening[i] * bands[i]);
         Response {
             stress,
-            tangent: tangent.map(|row| tensor::scale(&row, clock.stiffening)),
+            tangent: tensor::scale_tangent(tangent, clock.stiffening),
             state: State {
                 creep: found.creep,
                 history: clock

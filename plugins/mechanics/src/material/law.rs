@@ -471,7 +471,8 @@ impl Concrete {
             true => (p.at(maturity), p.modulus_at(age)),
             false => (p.at_28_days(), p.modulus),
         };
-        let shrinkage = self.setting.creep.as_ref().map_or(0.0, |creep| {
+        let lasting = self.setting.creep.as_ref().filter(|_| duration > 0.0);
+        let shrinkage = lasting.map_or(0.0, |creep| {
             let at = |t: f64| creep.shrinkage(t - state.birth, self.setting.curing).total();
             at(step.to) - at(step.from)
         });

@@ -60,10 +60,10 @@ impl Default for MarchSettings {
 
 impl MarchSettings {
     /// For the life of a member, wherever it is computed: forces within a per mille, and a step
-    /// whose iterations run out is taken at ten times that.
+    /// whose iterations run out is taken at ten times that. Its moments are near each other.
     #[must_use]
     pub fn of_life() -> Self {
-        Self { tolerance: 1e-3, loose: 10.0, linear: 1e-3, ..Self::default() }
+        Self { tolerance: 1e-3, loose: 10.0, linear: 1e-3, jump: 1.0, ..Self::default() }
     }
 
     /// For a deck, which other programs solve to their last digits: what flat or slender bricks are

@@ -701,8 +701,8 @@ impl<'m> System<'m> {
                     .for_each(|s| *s *= left);
             }
             each(point, &answer);
-            let of_brick = |s: f64| s * self.concrete[hex];
-            (answer.stress.map(of_brick), answer.tangent.map(|row| row.map(of_brick)))
+            let share = self.concrete[hex];
+            (tensor::scale(&answer.stress, share), tensor::scale_tangent(answer.tangent, share))
         };
         let corners = self.model.mesh.corners(hex as u32);
         let solid =

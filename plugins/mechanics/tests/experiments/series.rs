@@ -6,6 +6,7 @@
 //! half of each is computed.
 
 use intrados_mechanics::strength::Strength;
+use intrados_stage::cpu_seconds;
 
 use super::*;
 
@@ -137,15 +138,15 @@ impl Observer for Talk {
 
 /// What a member of a scene bears.
 fn strength(text: &str, element: Option<f64>) -> Strength {
-    let begin = std::time::Instant::now();
+    let begin = cpu_seconds();
     let life = jacked(text, element, &mut Talk::default());
     life.notes.iter().chain(&life.warnings).for_each(|n| println!("    {n}"));
     let strength = life.strength.expect("it was raised");
     println!(
-        "  {} unknowns, {} points of the curve, {:.0} s",
+        "  {} unknowns, {} points of the curve, {:.0} CPU-s",
         life.dof,
         strength.curve.len(),
-        begin.elapsed().as_secs_f64()
+        cpu_seconds() - begin
     );
     strength
 }
