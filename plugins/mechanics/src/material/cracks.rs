@@ -132,23 +132,27 @@ impl Planes {
         best.0.map(|i| principal[i])
     }
 
-    /// Strains that each plane has known once it is asked for `asked`: below its strength it
-    /// remembers nothing.
+    /// Strains that each plane has known once it is asked for `asked`.
     fn keep(&self, asked: [f64; 3], laws: &[Knee; 3]) -> [f64; 3] {
-        std::array::from_fn(|i| {
-            if asked[i] > laws[i].threshold { asked[i].max(self.kappa[i]) } else { self.kappa[i] }
-        })
+        std::array::from_fn(|i| kept(self.kappa[i], laws[i].threshold, asked[i]))
     }
 
     /// What each plane has known if a share of what it was asked for last, beyond its damage,
     /// becomes damage.
     fn grown(&self, share: f64, laws: &[Knee; 3]) -> [f64; 3] {
-        let grown = std::array::from_fn(|i| {
-            let from = self.kappa[i].max(laws[i].threshold);
-            from + share * (self.asked[i] - from).max(0.0)
-        });
-        self.keep(grown, laws)
+        std::array::from_fn(|i| grown(self.kappa[i], laws[i].threshold, self.asked[i], share))
     }
+}
+
+/// Strain that has been known once `asked` is: below its threshold a law remembers nothing.
+fn kept(known: f64, threshold: f64, asked: f64) -> f64 {
+    if asked > threshold { asked.max(known) } else { known }
+}
+
+/// What has been known if a share of what was asked for, beyond the damage, becomes damage.
+fn grown(known: f64, threshold: f64, asked: f64, share: f64) -> f64 {
+    let from = known.max(threshold);
+    kept(known, threshold, from + share * (asked - from).max(0.0))
 }
 
 /// Stress in the planes' axes.
@@ -546,10 +550,7 @@ impl Concrete {
         };
         let pressed = pressed / weaker;
         let crushed_by = match growth {
-            Some(share) => {
-                let from = state.kappa[1].max(compression.threshold);
-                state.kappa[1].max(from + share * (state.pressed - from))
-            }
+            Some(share) => grown(state.kappa[1], compression.threshold, state.pressed, share),
             None => state.kappa[1].max(pressed),
         };
         let damage = state.damage[1].max(compression.damage(crushed_by).0);
