@@ -301,6 +301,28 @@ fn a_plan_depends_on_no_clock() {
     }
 }
 
+/// Cases of an experiment are dealt out whole, each once. What would not be the same bits in every
+/// run, or is found of all cases together, is refused.
+#[test]
+fn cases_of_an_experiment_are_dealt_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path().join("cases");
+    let refused: [(&str, &[&str]); 5] = [
+        ("calibration", &[]),
+        ("column", &[]),
+        ("table-3-1", &["--", "--ablations"]),
+        ("table-3-1", &["--", "--cases", "3"]),
+        ("table-3-1", &["--each-member"]),
+    ];
+    for (over, words) in refused {
+        let args = ["campaign", "new", text(&dir), "--command", "experiment", "--over", over];
+        assert_eq!(code(&[&args[..], words].concat()), 2, "{over} {words:?}");
+        assert!(!dir.exists(), "{over} {words:?}");
+    }
+    new(&dir, "experiment", "table-3-1", 64, &["--", "--rehearsal", "1"]);
+    assert_eq!(status(&dir)["units"], 20);
+}
+
 /// A small network: forecast in one unit and in three, the page shows what is known and says what
 /// is not.
 #[test]
