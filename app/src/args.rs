@@ -1318,7 +1318,7 @@ pub(crate) enum CampaignStep {
     /// Writes and shows the job files of a scheduler, and hands them to it if asked
     #[command(
         group(clap::ArgGroup::new("engine").required(true)),
-        after_help = "Examples:\n  intrados campaign launch door64 --slurm --submit\n  intrados campaign launch door64 --kubernetes --image registry/intrados:0.1.0 --claim data | kubectl apply -f -"
+        after_help = "Examples:\n  intrados campaign launch door64 --slurm --submit\n  intrados campaign launch door64 --kubernetes --image registry/intrados:0.1.0 --claim data --submit"
     )]
     Launch(CampaignLaunch),
 }
@@ -1418,7 +1418,7 @@ pub(crate) struct CampaignLaunch {
     /// An array of Slurm, and a job that collects after it
     #[arg(long, group = "engine")]
     pub(crate) slurm: bool,
-    /// A job file of HyperQueue
+    /// A job file of HyperQueue, whose last task collects
     #[arg(long, group = "engine")]
     pub(crate) hyperqueue: bool,
     /// An Indexed Job of Kubernetes

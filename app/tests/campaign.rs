@@ -376,7 +376,9 @@ fn job_files_are_written_and_run() {
     };
     assert!(launch(&["--slurm"]).contains("#SBATCH --array=0-2"));
     assert!(launch(&["--kubernetes", "--image", "r/i:1"]).contains("completions: 3"));
-    assert_eq!(launch(&["--hyperqueue"]).matches("[[task]]").count(), 3);
+    let tasks = launch(&["--hyperqueue"]);
+    assert_eq!(tasks.matches("[[task]]").count(), 4);
+    assert!(tasks.contains("deps = [0, 1, 2]"), "{tasks}");
     assert_eq!(code(&["campaign", "launch", text(&dir), "--slurm", "--local", "2"]), 2);
     launch(&["--local", "2", "--submit"]);
     assert!(dir.join("collected/results.csv").is_file());
