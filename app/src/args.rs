@@ -1300,7 +1300,7 @@ pub(crate) struct Campaign {
 pub(crate) enum CampaignStep {
     /// Plans the units of work and writes them into a new folder
     #[command(
-        after_help = "Examples:\n  intrados campaign new hall --command predict --over column.ron beam.ron bridge/ -- --ahead 30\n  intrados campaign new door64 --command measure --over door --split 64 -- --spp 65536 --seed 7\n  intrados campaign new roads --command predict --over bridges.csv --split 64\n\nA table of bridges (.csv) becomes spans by stated rules (docs/network.md of this project), each with a life of its decisive section, or with --life full in finite elements. The rest of the command line, after --, goes to the command as it is; --out, --shard, --checkpoint, --resume and stop rules by clock are the campaign's own."
+        after_help = "Examples:\n  intrados campaign new hall --command predict --over column.ron beam.ron bridge/ -- --ahead 30\n  intrados campaign new door64 --command measure --over door --split 64 -- --spp 65536 --seed 7\n  intrados campaign new roads --command predict --over bridges.csv --split 64\n  intrados campaign new cases --command experiment --over table-3-1 --split 20\n\nA table of bridges (.csv) becomes spans by stated rules (docs/network.md of this project), each with a life of its decisive section, or with --life full in finite elements. The rest of the command line, after --, goes to the command as it is; --out, --shard, --checkpoint, --resume and stop rules by clock are the campaign's own."
     )]
     New(CampaignNew),
     /// Does units: those named, a part of all, or all one after the other
@@ -1318,7 +1318,7 @@ pub(crate) enum CampaignStep {
     /// Writes and shows the job files of a scheduler, and hands them to it if asked
     #[command(
         group(clap::ArgGroup::new("engine").required(true)),
-        after_help = "Examples:\n  intrados campaign launch door64 --slurm --submit\n  intrados campaign launch door64 --kubernetes --image registry/intrados:0.1.0 --claim data | kubectl apply -f -"
+        after_help = "Examples:\n  intrados campaign launch door64 --slurm --submit\n  intrados campaign launch door64 --kubernetes --image registry/intrados:0.1.0 --claim data --submit"
     )]
     Launch(CampaignLaunch),
 }
@@ -1332,6 +1332,7 @@ pub(crate) enum Job {
     Render,
     Scan,
     Analyze,
+    Experiment,
 }
 
 /// How a span of a table lives.
@@ -1352,10 +1353,12 @@ pub(crate) struct CampaignNew {
     /// What is done in every unit
     #[arg(long, value_enum)]
     pub(crate) command: Job,
-    /// Scenes, project folders, models, names of bundled scenes; or one table of bridges (.csv)
+    /// Scenes, project folders, models, names of bundled scenes; or one table of bridges (.csv); or
+    /// the experiment table-3-1
     #[arg(long, required = true, num_args = 1.., value_name = "STRUCTURE")]
     pub(crate) over: Vec<PathBuf>,
-    /// Units per structure (measure, render: parts of the walks), or of a table
+    /// Units per structure (measure, render: parts of the walks), of a table, or of an experiment's
+    /// cases
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = value_parser!(u64).range(1..=1 << 16))]
     pub(crate) split: u64,
     /// A unit for every member (scan, analyze)
@@ -1415,7 +1418,7 @@ pub(crate) struct CampaignLaunch {
     /// An array of Slurm, and a job that collects after it
     #[arg(long, group = "engine")]
     pub(crate) slurm: bool,
-    /// A job file of HyperQueue
+    /// A job file of HyperQueue, whose last task collects
     #[arg(long, group = "engine")]
     pub(crate) hyperqueue: bool,
     /// An Indexed Job of Kubernetes

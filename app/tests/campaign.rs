@@ -301,6 +301,28 @@ fn a_plan_depends_on_no_clock() {
     }
 }
 
+/// Cases of an experiment are dealt out whole, each once. What would not be the same bits in every
+/// run, or is found of all cases together, is refused.
+#[test]
+fn cases_of_an_experiment_are_dealt_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path().join("cases");
+    let refused: [(&str, &[&str]); 5] = [
+        ("calibration", &[]),
+        ("column", &[]),
+        ("table-3-1", &["--", "--ablations"]),
+        ("table-3-1", &["--", "--cases", "3"]),
+        ("table-3-1", &["--each-member"]),
+    ];
+    for (over, words) in refused {
+        let args = ["campaign", "new", text(&dir), "--command", "experiment", "--over", over];
+        assert_eq!(code(&[&args[..], words].concat()), 2, "{over} {words:?}");
+        assert!(!dir.exists(), "{over} {words:?}");
+    }
+    new(&dir, "experiment", "table-3-1", 64, &["--", "--rehearsal", "1"]);
+    assert_eq!(status(&dir)["units"], 20);
+}
+
 /// A small network: forecast in one unit and in three, the page shows what is known and says what
 /// is not.
 #[test]
@@ -354,7 +376,9 @@ fn job_files_are_written_and_run() {
     };
     assert!(launch(&["--slurm"]).contains("#SBATCH --array=0-2"));
     assert!(launch(&["--kubernetes", "--image", "r/i:1"]).contains("completions: 3"));
-    assert_eq!(launch(&["--hyperqueue"]).matches("[[task]]").count(), 3);
+    let tasks = launch(&["--hyperqueue"]);
+    assert_eq!(tasks.matches("[[task]]").count(), 4);
+    assert!(tasks.contains("deps = [0, 1, 2]"), "{tasks}");
     assert_eq!(code(&["campaign", "launch", text(&dir), "--slurm", "--local", "2"]), 2);
     launch(&["--local", "2", "--submit"]);
     assert!(dir.join("collected/results.csv").is_file());

@@ -325,7 +325,11 @@ fn page(plan: &Plan, all: &Collected) -> Result<Option<String>, Failure> {
     let page = page_of::Page {
         title: plan.structures.first().filter(|_| plan.network.is_none()).map_or_else(
             || "A network of bridges".to_owned(),
-            |s| format!("{} and {} others", s.name, plan.structures.len() - 1),
+            |s| match plan.structures.len() - 1 {
+                0 => s.name.clone(),
+                1 => format!("{} and another", s.name),
+                others => format!("{} and {others} others", s.name),
+            },
         ),
         version: env!("CARGO_PKG_VERSION").into(),
         states: page::state_names(&all.rows),

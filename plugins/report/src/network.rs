@@ -80,8 +80,8 @@ struct Structure<'a> {
 struct Shown<'a> {
     page: &'a Page,
     structures: Vec<Structure<'a>>,
-    /// Parts of which nothing is forecast, by why.
-    unknown: BTreeMap<&'a str, usize>,
+    /// Structures of which something is not forecast, part by part, by why.
+    unknown: BTreeMap<&'a str, Vec<&'a str>>,
     parts: usize,
     map: Map,
 }
@@ -100,9 +100,9 @@ struct Map {
 /// The template cannot be filled.
 pub fn html(page: &Page) -> Result<String, askama::Error> {
     let structures = ranked(page);
-    let mut unknown = BTreeMap::new();
+    let mut unknown: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
     for item in page.items.iter().filter(|i| !i.not_forecast.is_empty()) {
-        *unknown.entry(item.not_forecast.as_str()).or_default() += 1;
+        unknown.entry(item.not_forecast.as_str()).or_default().push(item.structure.as_str());
     }
     let shown = Shown {
         page,
@@ -234,6 +234,15 @@ impl Shown<'_> {
         year.map_or_else(|| "-".into(), |year| year.to_string())
     }
 
+    /// Structures by their ids, each once, the first of many.
+    fn named(&self, parts: &[&str]) -> String {
+        let mut ids = parts.to_vec();
+        ids.dedup();
+        let more = if ids.len() > FIRST { ", …" } else { "" };
+        ids.truncate(FIRST);
+        ids.join(", ") + more
+    }
+
     fn first(&self) -> &[Structure<'_>] {
         &self.structures[..self.structures.len().min(FIRST)]
     }
@@ -270,7 +279,9 @@ mod tests {
             ranked.iter().map(|s| (s.worst.structure.as_str(), s.parts, s.poor)).collect();
         assert_eq!(order, [("a", 2, 0.6), ("b", 1, 0.2)]);
         let text = html(&page).unwrap();
-        assert!(text.contains("no year") && text.contains("circle"));
+        assert!(text.contains("circle"));
+        // Of what nothing is forecast has its name there, too.
+        assert!(text.contains("<td>c</td><td>no year</td>"), "{text}");
         // Whatever a table says is text, and no part of the page.
         assert!(!text.contains("<a>") && text.contains("&lt;a&gt;"));
     }

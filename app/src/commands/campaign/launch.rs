@@ -161,13 +161,27 @@ fn hyperqueue(names: &Names, wish: &Wish) -> JobFiles {
             "\n[[task]]\nid = {id}\ncommand = [\"sh\", \"task.sh\"]\ncrash_limit = 1000\n[[task.request]]\nresources = {{ \"cpus\" = \"{cores}\" }}\n"
         );
     }
+    // Where a task failed HyperQueue cancels what rests on it: then collecting is the user's, who
+    // is told so.
+    let all: Vec<String> = (0..tasks).map(|id| id.to_string()).collect();
+    _ = write!(
+        job,
+        "\n[[task]]\nid = {tasks}\ncommand = [\"sh\", \"collect.sh\"]\ncrash_limit = 1000\ndeps = [{}]\n",
+        all.join(", ")
+    );
+    let collect = format!("#!/bin/sh\nexec {program} campaign collect {dir}\n");
     let submit = format!(
-        "#!/bin/sh\nset -e\ncd {dir}/launch/hyperqueue\nhq job submit-file job.toml\n# Once it is done (hq job wait last): {program} campaign collect {dir}\n"
+        "#!/bin/sh\nset -e\ncd {dir}/launch/hyperqueue\nhq job submit-file job.toml\n# Where tasks failed, the last one does not collect: {program} campaign status {dir}\n"
     );
     let task = task(names, wish, "$HQ_TASK_ID");
     JobFiles {
         folder: "hyperqueue",
-        files: vec![("task.sh", task), ("job.toml", job), ("submit.sh", submit)],
+        files: vec![
+            ("task.sh", task),
+            ("collect.sh", collect),
+            ("job.toml", job),
+            ("submit.sh", submit),
+        ],
     }
 }
 
@@ -233,9 +247,10 @@ spec:
             claimName: {claim}
 "#
     );
+    // An Indexed Job has no last step of its own.
+    let shown = quoted(&names.dir);
     let submit = format!(
-        "#!/bin/sh\nset -e\ncd {}/launch/kubernetes\nkubectl apply -f job.yaml\n",
-        quoted(&names.dir)
+        "#!/bin/sh\nset -e\ncd {shown}/launch/kubernetes\nkubectl apply -f job.yaml\n# Once it is done (kubectl wait --for=condition=complete --timeout=-1s job/intrados-{name}), where its volume is mounted: intrados campaign collect {shown}\n"
     );
     Ok(JobFiles { folder: "kubernetes", files: vec![("job.yaml", job), ("submit.sh", submit)] })
 }

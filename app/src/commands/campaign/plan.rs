@@ -21,6 +21,9 @@ use crate::{
 const SCHEMA: &str = "intrados.campaign/1";
 /// Most units of a campaign.
 const MOST: usize = 1_000_000;
+/// The experiment whose cases stand each by itself, and how many they are.
+const TABLE: &str = "table-3-1";
+const CASES: u64 = 20;
 /// Longest plan that is read, bytes.
 const LONGEST: u64 = 1 << 30;
 /// What a campaign says itself, and what would make results depend on a clock.
@@ -59,9 +62,10 @@ pub(crate) struct Plan {
 pub(crate) struct Structure {
     /// Unlike all others of the plan.
     pub(crate) name: String,
-    /// A file, or the name of a scene that comes with the program.
+    /// A file, or the name of a scene or an experiment that comes with the program.
     pub(crate) path: PathBuf,
-    /// Of the scene and every file it names; of the table.
+    /// Of the scene and every file it names; of the table; none of an experiment, which comes with
+    /// the program, whose version every id has.
     pub(crate) hash: String,
 }
 
@@ -74,7 +78,7 @@ pub(crate) struct Unit {
     pub(crate) structure: usize,
     /// Of one member alone.
     pub(crate) member: Option<String>,
-    /// Part I of N: of the walks, or of the rows of a table.
+    /// Part I of N: of the walks, of the rows of a table, or of the cases of an experiment.
     pub(crate) part: [u64; 2],
 }
 
@@ -142,6 +146,11 @@ impl Plan {
         })?;
         let mut words = vec!["intrados".to_owned(), name(self.command).to_owned(), path.to_owned()];
         words.extend(unit.member.iter().flat_map(|id| ["--member".to_owned(), id.clone()]));
+        if self.command == args::Job::Experiment {
+            let [part, of] = unit.part;
+            let (first, last) = (CASES * part / of + 1, CASES * (part + 1) / of);
+            words.extend(["--cases".to_owned(), format!("{first}..{last}")]);
+        }
         words.extend(self.words.iter().cloned());
         if self.walks() && unit.part[1] > 1 {
             words.extend(["--shard".to_owned(), format!("{}/{}", unit.part[0], unit.part[1])]);
@@ -163,6 +172,7 @@ pub(crate) fn name(command: args::Job) -> &'static str {
         args::Job::Render => "render",
         args::Job::Scan => "scan",
         args::Job::Analyze => "analyze",
+        args::Job::Experiment => "experiment",
     }
 }
 
@@ -186,6 +196,7 @@ pub(crate) fn plan(session: &Session, args: &args::CampaignNew) -> Result<Plan, 
                 table.display()
             )));
         }
+        None if args.command == args::Job::Experiment => of_cases(&mut plan, args)?,
         None => of_scenes(session, &mut plan, args)?,
     }
     for k in 0..plan.units.len() {
@@ -221,6 +232,32 @@ fn of_table(plan: &mut Plan, args: &args::CampaignNew, path: &Path) -> Result<()
     plan.structures.push(Structure { name: "network".into(), path, hash });
     plan.units = (0..of).map(|k| unit(0, None, [k, of])).collect();
     Ok(())
+}
+
+/// Cases of the one experiment that has some. What calibration finds is of all plantings together,
+/// and what an experiment leaves out by equal time depends on a clock.
+fn of_cases(plan: &mut Plan, args: &args::CampaignNew) -> Result<(), Failure> {
+    if args.over != [PathBuf::from(TABLE)] || args.each_member {
+        return Err(Failure::Usage(format!(
+            "of experiments only {TABLE} has cases to deal out: --command experiment --over {TABLE} --split {CASES}"
+        )));
+    }
+    let other = |word: &String| word.starts_with('-') && flag(word) != "--rehearsal";
+    if let Some(word) = args.rest.iter().find(|word| other(word)) {
+        return Err(Failure::Usage(format!(
+            "{word} after --: units of an experiment take --rehearsal alone"
+        )));
+    }
+    let of = args.split.min(CASES);
+    plan.structures.push(Structure { name: TABLE.into(), path: TABLE.into(), hash: String::new() });
+    plan.units = (0..of).map(|k| unit(0, None, [k, of])).collect();
+    parse(&plan.words_of(&plan.units[0])?)?;
+    Ok(())
+}
+
+/// A word without the value that it may carry.
+fn flag(word: &str) -> &str {
+    word.split('=').next().unwrap_or_default()
 }
 
 fn of_scenes(session: &Session, plan: &mut Plan, args: &args::CampaignNew) -> Result<(), Failure> {
@@ -261,8 +298,7 @@ fn of_scenes(session: &Session, plan: &mut Plan, args: &args::CampaignNew) -> Re
 }
 
 fn check_words(plan: &Plan, args: &args::CampaignNew) -> Result<(), Failure> {
-    let flag = |word: &str| word.split('=').next().unwrap_or_default().to_owned();
-    if let Some(ours) = args.rest.iter().map(|w| flag(w)).find(|w| OURS.contains(&w.as_str())) {
+    if let Some(ours) = args.rest.iter().map(|w| flag(w)).find(|w| OURS.contains(w)) {
         return Err(Failure::Usage(format!(
             "{ours} after --: the campaign says that itself, or results would depend on a clock; \
              leave it out (threads: `campaign run --threads`)"

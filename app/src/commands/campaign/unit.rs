@@ -112,13 +112,17 @@ fn work(
     let (list, rows): (_, fn(&Structure, &Value) -> Rows) = match plan.command {
         args::Job::Scan => ("scan.json", scanned),
         args::Job::Analyze => ("analyze.json", analysed),
+        args::Job::Experiment => ("table-3-1.json", judged),
         _ => ("predict.json", predicted),
     };
     let list = files.join(list);
     let bytes = access::read(&list, LONGEST).map_err(|why| Failure::denied(&list, &why))?;
     let report: Value = serde_json::from_slice(&bytes)
         .map_err(|e| Failure::Internal(format!("{}: cannot be read: {e}", list.display())))?;
-    check_scene(structure, report["scene_hash"].as_str().unwrap_or_default())?;
+    // An experiment is of no scene.
+    if plan.command != args::Job::Experiment {
+        check_scene(structure, report["scene_hash"].as_str().unwrap_or_default())?;
+    }
     keep(&held.folder, &rows(structure, &report)).map(Some)
 }
 
@@ -260,6 +264,33 @@ fn scanned(structure: &Structure, report: &Value) -> Rows {
         ("pores", "pores"),
     ];
     of(structure, &report["scans"], &OF)
+}
+
+/// A row for every case of `intrados experiment table-3-1`, without the times it took.
+fn judged(structure: &Structure, report: &Value) -> Rows {
+    const OF: [(&str, &str); 12] = [
+        ("id", "case"),
+        ("kind", "kind"),
+        ("ours", "ours"),
+        ("reference", "reference"),
+        ("strong_reference", "strong_reference"),
+        ("otsu_corrected", "otsu_corrected"),
+        ("kv", "voltage [kV]"),
+        ("pixel_mm", "pixel [mm]"),
+        ("pores", "pores"),
+        ("crack_pixels", "crack_pixels"),
+        ("scatter_to_primary", "scatter_to_primary [1]"),
+        ("transmission", "transmission [1]"),
+    ];
+    let mut rows = of(structure, &report["cases"], &OF);
+    for name in ["ours", "reference", "strong_reference"] {
+        rows.columns.extend(["low", "high"].map(|end| format!("{name}_95_{end}")));
+        let interval = format!("{name}_ci95");
+        for (row, case) in rows.rows.iter_mut().zip(list(&report["cases"])) {
+            row.extend([0, 1].map(|end: usize| case[interval.as_str()][end].clone()));
+        }
+    }
+    rows
 }
 
 fn of(structure: &Structure, items: &Value, of: &[(&str, &str)]) -> Rows {
