@@ -26,7 +26,7 @@ const MAX_FILE: u64 = 4 << 30;
 #[must_use]
 pub fn bundled() -> &'static [(&'static str, &'static str)] {
     macro_rules! scenes {
-        ($($name:literal),*) => { &[$(($name, include_str!(concat!("../../../scenes/", $name, ".ron")))),*] };
+        ($($name:literal),*) => { &[$(($name, include_str!(concat!("../scenes/", $name, ".ron")))),*] };
     }
     scenes!(
         "column",

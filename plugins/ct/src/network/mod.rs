@@ -2,7 +2,7 @@
 //!
 //! An [`Unet`] of three levels of resolution. It sees two planes: how far grey lies from that of
 //! sound concrete, and where the body is. It was trained by [`train`] on the slices of
-//! [`simulate`], never on a real one; `assets/network` holds the weights and how they came to be.
+//! [`simulate`], never on a real one; `assets` holds the weights and how they came to be.
 
 pub mod simulate;
 pub mod train;
@@ -44,10 +44,10 @@ const MARGIN: usize = 32;
 
 /// The weights that the program carries, as little-endian floats, and how many planes the first
 /// level has.
-static CARRIED: &[u8] = include_bytes!("../../../../assets/network/unet.f32");
+static CARRIED: &[u8] = include_bytes!("../../assets/unet.f32");
 
 /// Weights of another network of this kind, for scans of members.
-static MEMBER: &[u8] = include_bytes!("../../../../assets/network/member.f32");
+static MEMBER: &[u8] = include_bytes!("../../assets/member.f32");
 
 /// The network for scans of members.
 static OF_MEMBERS: LazyLock<Option<Network>> = LazyLock::new(|| Network::from_bytes(MEMBER));
@@ -87,7 +87,7 @@ impl Network {
         BUILTIN.as_ref()
     }
 
-    /// The network that the program carries for scans of members (`assets/network/member.ron`);
+    /// The network that the program carries for scans of members (`plugins/ct/assets/member.ron`);
     /// `None` if its weights are damaged.
     #[must_use]
     pub fn of_members() -> Option<&'static Self> {

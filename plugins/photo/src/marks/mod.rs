@@ -3,7 +3,7 @@
 //!
 //! A small U-Net looks at every pixel. It was trained by [`train`] on rendered pictures alone
 //! ([`lesson`]): no photograph was shown to it, and only the thresholds below were chosen on some.
-//! `assets/network` holds the weights and how they came to be.
+//! `plugins/photo/assets` holds the weights and how they came to be.
 
 mod camera;
 pub mod lesson;
@@ -58,7 +58,7 @@ const TILE: usize = 1024;
 const MARGIN: usize = 128;
 
 /// The weights that the program carries, as little-endian floats.
-static CARRIED: &[u8] = include_bytes!("../../../../assets/network/photo.f32");
+static CARRIED: &[u8] = include_bytes!("../../assets/photo.f32");
 
 static BUILTIN: LazyLock<Option<Reader>> = LazyLock::new(|| Reader::from_bytes(&LEVELS, CARRIED));
 

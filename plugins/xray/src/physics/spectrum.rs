@@ -2,7 +2,7 @@
 
 use super::{Material, PhysicsError, table::rows};
 
-const TUBE: &str = include_str!("../../../../assets/xray/tube.csv");
+const TUBE: &str = include_str!("../../assets/tube.csv");
 
 /// Spectra of the bare tube by voltage.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,9 +1,9 @@
-//! The tables of `assets/xray`, checked and interpolated.
+//! The tables of `assets`, checked and interpolated.
 
 use super::PhysicsError;
 
-const ATTENUATION: &str = include_str!("../../../../assets/xray/attenuation.csv");
-const FORMS: &str = include_str!("../../../../assets/xray/form.csv");
+const ATTENUATION: &str = include_str!("../../assets/attenuation.csv");
+const FORMS: &str = include_str!("../../assets/form.csv");
 
 /// μ/ρ by what happens, m²/kg.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
