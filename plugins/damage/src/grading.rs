@@ -15,10 +15,8 @@ pub use crate::error::ProfileError;
 /// The profile that holds where nobody names another.
 const FOUR_STATES: &str = include_str!("../assets/four_states.ron");
 /// The profiles that are built in, by their names in scenes and on the command line.
-const BUILT_IN: [(&str, &str); 2] = [
-    ("four_states", FOUR_STATES),
-    ("tight_cracks", include_str!("../assets/tight_cracks.ron")),
-];
+const BUILT_IN: [(&str, &str); 2] =
+    [("four_states", FOUR_STATES), ("tight_cracks", include_str!("../assets/tight_cracks.ron"))];
 
 /// Longest profile, bytes.
 const MAX_BYTES: u64 = 1 << 20;

@@ -1,6 +1,6 @@
 //! Reads the cracks of every picture of a folder into masks `X.png`; beside them how probable
 //! cracks are, `X.chance.png`, and the picture with its marks, `X.marks.png`:
-//! `cargo run --release -p intrados-photo --example marks -- FOLDER OUT [WEIGHTS.f32]`.
+//! `cargo run --release -p intrados-photo --example marks -- FOLDER OUT [CRACKS.f32 [AREAS.f32]]`.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "an example for people")]
 
@@ -9,7 +9,7 @@ use std::path::PathBuf;
 use image::{GrayImage, Luma, Rgb, RgbImage};
 use intrados_photo::{
     Photograph,
-    marks::{Mark, Reader},
+    marks::{Mark, Network, Reader},
     picture::srgb,
 };
 use intrados_raster::Grid;
@@ -18,10 +18,16 @@ use intrados_stage::{Job, cpu_seconds};
 fn main() {
     let mut args = std::env::args().skip(1).map(PathBuf::from);
     let [folder, out] = std::array::from_fn(|_| args.next().expect("two folders"));
-    let own = args.next().map(|path| {
-        Reader::from_bytes(&[16, 32, 48, 64], &std::fs::read(path).unwrap()).expect("weights")
-    });
-    let reader = own.as_ref().or(Reader::builtin()).expect("weights");
+    let mut reader = Reader::builtin().expect("weights").clone();
+    let network = |path: PathBuf| {
+        Network::from_bytes(&[16, 32, 48, 64], &std::fs::read(path).unwrap()).expect("weights")
+    };
+    if let Some(path) = args.next() {
+        reader.cracks = network(path);
+    }
+    if let Some(path) = args.next() {
+        reader.areas = network(path);
+    }
     std::fs::create_dir_all(&out).unwrap();
     let mut files: Vec<PathBuf> =
         std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().path()).collect();

@@ -5,7 +5,7 @@
 
 use std::path::PathBuf;
 
-use intrados_photo::marks::{Reader, lesson::Lesson, train::Recipe};
+use intrados_photo::marks::{Network, lesson::Lesson, train::Recipe};
 use intrados_stage::{Job, cpu_seconds};
 
 fn main() {
@@ -17,7 +17,7 @@ fn main() {
         Lesson::from_bytes(&bytes).expect("a whole lesson")
     };
     let (mut sum, begin) = (0.0, cpu_seconds());
-    let tell = |step: usize, loss: f32, reader: &Reader| {
+    let tell = |step: usize, loss: f32, network: &Network| {
         sum += loss;
         if (step + 1).is_multiple_of(50) {
             println!("{}: {:.4}, {:.0} CPU-s", step + 1, sum / 50.0, cpu_seconds() - begin);
@@ -25,9 +25,9 @@ fn main() {
         }
         if (step + 1).is_multiple_of(500) {
             let beside = out.with_extension(format!("{}.f32", step + 1));
-            std::fs::write(beside, reader.to_bytes()).unwrap();
+            std::fs::write(beside, network.to_bytes()).unwrap();
         }
     };
-    let reader = Reader::trained(&recipe, lesson, &Job::default(), tell).unwrap();
-    std::fs::write(&out, reader.to_bytes()).unwrap();
+    let network = Network::trained(&recipe, lesson, &Job::default(), tell).unwrap();
+    std::fs::write(&out, network.to_bytes()).unwrap();
 }

@@ -1,9 +1,10 @@
 //! Damage that is seen in a photograph: which pixels show a crack, missing cover, bared steel,
 //! rust, efflorescence.
 //!
-//! A small U-Net looks at every pixel. It was trained by [`train`] on rendered pictures alone
-//! ([`lesson`]): no photograph was shown to it, and only the thresholds below were chosen on some.
-//! `plugins/photo/assets` holds the weights and how they came to be.
+//! Two small U-Nets look at the picture, one for cracks and one for all else. They were trained by
+//! [`train`] on rendered pictures alone ([`lesson`]): no photograph was shown to them, and only the
+//! thresholds of cracks were chosen on some. `plugins/photo/assets` holds the weights and how they came
+//! to be.
 
 mod camera;
 pub mod lesson;
@@ -22,7 +23,7 @@ use intrados_raster::{
 };
 use intrados_stage::{Cancelled, Job};
 
-use scales::{SCALES, SMALLEST, halved};
+use scales::{SCALES, SMALLEST, halved, together};
 use sight::{CELL, PIXELS, PLANES, Sight};
 
 /// A kind of damage that is seen.
@@ -57,14 +58,27 @@ const TILE: usize = 1024;
 /// cells.
 const MARGIN: usize = 128;
 
-/// The weights that the program carries, as little-endian floats.
-static CARRIED: &[u8] = include_bytes!("../../assets/photo.f32");
+/// The weights that the program carries, as little-endian floats: for cracks, and for all else.
+static CARRIED: [&[u8]; 2] =
+    [include_bytes!("../../assets/photo.f32"), include_bytes!("../../assets/areas.f32")];
 
-static BUILTIN: LazyLock<Option<Reader>> = LazyLock::new(|| Reader::from_bytes(&LEVELS, CARRIED));
+static BUILTIN: LazyLock<Option<Reader>> = LazyLock::new(|| {
+    let [cracks, areas] = CARRIED.map(|bytes| Network::from_bytes(&LEVELS, bytes));
+    Some(Reader { cracks: cracks?, areas: areas? })
+});
 
-/// A trained network that reads damage.
+/// A trained network.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Reader(Unet);
+pub struct Network(Unet);
+
+/// What reads damage.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Reader {
+    /// What finds cracks.
+    pub cracks: Network,
+    /// What finds all else.
+    pub areas: Network,
+}
 
 /// How probable each kind of damage is, pixel by pixel.
 #[derive(Debug, Clone, PartialEq)]
@@ -85,8 +99,8 @@ impl Marks {
         outline::lines(self.of(Mark::Crack), outline::CRACKS)
     }
 
-    /// Where there is damage of a kind. With the carried weights about half of the steel and of the
-    /// rust is found, and next to nothing of missing cover and efflorescence.
+    /// Where there is damage of a kind. With the carried weights most of bared steel and of rust is
+    /// found, a quarter of missing cover, little of efflorescence.
     #[must_use]
     pub fn areas(&self, mark: Mark) -> Mask {
         match mark {
@@ -116,13 +130,7 @@ fn shape(levels: &[usize]) -> Shape {
     Shape { inputs: PLANES * PIXELS, levels: levels.to_vec(), outputs: MARKS * PIXELS }
 }
 
-impl Reader {
-    /// The network that the program carries; `None` if its weights are damaged.
-    #[must_use]
-    pub fn builtin() -> Option<&'static Self> {
-        BUILTIN.as_ref()
-    }
-
+impl Network {
     /// Reads weights, little-endian floats, of a network with so many planes a level.
     #[must_use]
     pub fn from_bytes(levels: &[usize], bytes: &[u8]) -> Option<Self> {
@@ -135,6 +143,66 @@ impl Reader {
         self.0.to_bytes()
     }
 
+    /// How probable some kinds are, pixel by pixel; what is not `known` shows none.
+    fn look<const N: usize>(
+        &self,
+        sight: &Sight,
+        known: &Mask,
+        wanted: [Mark; N],
+        tile: usize,
+        job: &Job,
+    ) -> Result<[Grid<f32>; N], Cancelled> {
+        let [width, height] = sight.size();
+        let mut grids = wanted.map(|_| Grid::new(width, height, 0.0));
+        let mut spare = Spare::default();
+        for y in (0..height).step_by(tile) {
+            for x in (0..width).step_by(tile) {
+                let (out, first) = self.tile(sight, [x, y], tile, &mut spare, job)?;
+                for (mark, grid) in wanted.iter().zip(&mut grids) {
+                    for v in y..(y + tile).min(height) {
+                        let row = &mut grid.data[v * width..][..width];
+                        for (u, value) in row.iter_mut().enumerate().skip(x).take(tile) {
+                            let score = score(&out, *mark as usize, [u - first[0], v - first[1]]);
+                            *value = 1.0 / (1.0 + (-score).exp());
+                        }
+                    }
+                }
+                spare.give(out);
+            }
+        }
+        for grid in &mut grids {
+            let unknown = grid.data.iter_mut().zip(&known.data).filter(|(_, known)| !**known);
+            unknown.for_each(|(v, _)| *v = 0.0);
+        }
+        Ok(grids)
+    }
+
+    /// What the network says of the tile whose top left is at `from`, and of which pixel first.
+    fn tile(
+        &self,
+        sight: &Sight,
+        from: [usize; 2],
+        tile: usize,
+        spare: &mut Spare,
+        job: &Job,
+    ) -> Result<(Planes, [usize; 2]), Cancelled> {
+        let size = sight.size();
+        let first = from.map(|at| at.saturating_sub(MARGIN));
+        let cells = [0, 1].map(|k| {
+            let last = (from[k] + tile + MARGIN).min(size[k]);
+            (last - first[k]).div_ceil(CELL).next_multiple_of(self.0.shape().divisor())
+        });
+        Ok((self.0.look(sight.cells(first, cells), spare, job)?, first))
+    }
+}
+
+impl Reader {
+    /// The networks that the program carries; `None` if their weights are damaged.
+    #[must_use]
+    pub fn builtin() -> Option<&'static Self> {
+        BUILTIN.as_ref()
+    }
+
     /// Reads damage in linear light of any scale; what is not `known` shows none.
     ///
     /// # Errors
@@ -143,7 +211,7 @@ impl Reader {
         self.marks_by(TILE, light, known, job)
     }
 
-    /// From all views.
+    /// Cracks from all views; all else, which is broader, as it is.
     fn marks_by(
         &self,
         tile: usize,
@@ -151,65 +219,20 @@ impl Reader {
         known: &Mask,
         job: &Job,
     ) -> Result<Marks, Cancelled> {
-        let mut looks = vec![self.at_one_scale(tile, light, known, job)?];
-        let mut farther = halved(light, known);
-        while looks.len() < SCALES && farther.0.width.min(farther.0.height) >= SMALLEST {
-            looks.push(self.at_one_scale(tile, &farther.0, &farther.1, job)?);
-            farther = halved(&farther.0, &farther.1);
-        }
-        Ok(Marks::together(looks, known))
-    }
-
-    fn at_one_scale(
-        &self,
-        tile: usize,
-        light: &Grid<Vec3>,
-        known: &Mask,
-        job: &Job,
-    ) -> Result<Marks, Cancelled> {
         let sight = Sight::new(light, known, job)?;
-        let mut marks = none(light.width, light.height);
-        let mut spare = Spare::default();
-        for y in (0..light.height).step_by(tile) {
-            for x in (0..light.width).step_by(tile) {
-                self.tile(&sight, [x, y], tile, &mut marks, &mut spare, job)?;
-            }
+        let [_, others @ ..] = Mark::ALL;
+        let areas = self.areas.look(&sight, known, others, tile, job)?;
+        let [near] = self.cracks.look(&sight, known, [Mark::Crack], tile, job)?;
+        let (mut looks, mut farther) = (vec![near], halved(light, known));
+        while looks.len() < SCALES && farther.0.width.min(farther.0.height) >= SMALLEST {
+            let (light, known) = &farther;
+            let sight = Sight::new(light, known, job)?;
+            looks.extend(self.cracks.look(&sight, known, [Mark::Crack], tile, job)?);
+            farther = halved(light, known);
         }
-        for grid in &mut marks.grids {
-            let unknown = grid.data.iter_mut().zip(&known.data).filter(|(_, known)| !**known);
-            unknown.for_each(|(v, _)| *v = 0.0);
-        }
-        Ok(marks)
-    }
-
-    /// Fills the tile whose top left is at `from`.
-    fn tile(
-        &self,
-        sight: &Sight,
-        from: [usize; 2],
-        tile: usize,
-        marks: &mut Marks,
-        spare: &mut Spare,
-        job: &Job,
-    ) -> Result<(), Cancelled> {
-        let size = sight.size();
-        let first = from.map(|at| at.saturating_sub(MARGIN));
-        let cells = [0, 1].map(|k| {
-            let last = (from[k] + tile + MARGIN).min(size[k]);
-            (last - first[k]).div_ceil(CELL).next_multiple_of(self.0.shape().divisor())
-        });
-        let out = self.0.look(sight.cells(first, cells), spare, job)?;
-        for (mark, grid) in marks.grids.iter_mut().enumerate() {
-            for y in from[1]..(from[1] + tile).min(size[1]) {
-                let row = &mut grid.data[y * size[0]..][..size[0]];
-                for (x, value) in row.iter_mut().enumerate().skip(from[0]).take(tile) {
-                    let score = score(&out, mark, [x - first[0], y - first[1]]);
-                    *value = 1.0 / (1.0 + (-score).exp());
-                }
-            }
-        }
-        spare.give(out);
-        Ok(())
+        let mut grids = std::iter::once(together(looks, known)).chain(areas);
+        let empty = || Grid::new(0, 0, 0.0);
+        Ok(Marks { grids: std::array::from_fn(|_| grids.next().unwrap_or_else(empty)) })
     }
 }
 

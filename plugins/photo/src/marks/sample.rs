@@ -10,7 +10,7 @@ use intrados_stage::{
 };
 
 use super::{
-    MARKS, camera,
+    MARKS, Mark, camera,
     lesson::{Lesson, Mouth},
     sight::Sight,
 };
@@ -43,6 +43,19 @@ impl Frame {
         let x = [Vec2::X, Vec2::Y, -Vec2::X, -Vec2::Y][draw.count(0, 3)];
         let y = if draw.chance(0.5) { x.perp() } else { -x.perp() };
         Self { zoom, middle, axes: [x, y], side }
+    }
+
+    /// Moves so far that a place of the lesson that shows a kind is in sight.
+    fn show(&mut self, lesson: &Lesson, mark: usize, draw: &mut Draw) {
+        let shown = lesson.labels.iter().enumerate().filter(|(_, l)| l[mark] > 0.5);
+        let shown: Vec<usize> = shown.map(|(i, _)| i).collect();
+        let Some(last) = shown.len().checked_sub(1) else { return };
+        let i = shown[draw.count(0, last)];
+        let place = vec2((i % lesson.side) as f32, (i / lesson.side) as f32);
+        let half = Vec2::splat(0.5 * self.side as f32 / self.zoom);
+        let mut off = || 1.4 * (draw.unit() as f32 - 0.5);
+        let whole = Vec2::splat(lesson.side as f32);
+        self.middle = (place + half * vec2(off(), off())).clamp(half, (whole - half).max(half));
     }
 
     /// Of a place of the crop, in pixels of the lesson.
@@ -99,15 +112,25 @@ pub(super) struct Sample {
     pub(super) sight: Sight,
     /// What covers each pixel, in [0, 1].
     pub(super) truth: Grid<[f32; MARKS]>,
-    /// Whether what is said of cracks there counts.
-    pub(super) counts: Grid<bool>,
+    /// Whether what is said of each kind there counts.
+    pub(super) counts: Grid<[bool; MARKS]>,
+    /// How bright it is, as a root.
+    grey: Grid<f32>,
 }
 
 impl Sample {
-    /// Of a lesson, as `key` draws it.
-    pub(super) fn drawn(lesson: &Lesson, side: usize, key: Key) -> Result<Self, Cancelled> {
+    /// Of a lesson, as `key` draws it; somewhere around a place that shows the kind `about`.
+    pub(super) fn drawn(
+        lesson: &Lesson,
+        side: usize,
+        about: Option<usize>,
+        key: Key,
+    ) -> Result<Self, Cancelled> {
         let mut draw = Draw::new(key);
-        let frame = Frame::drawn(lesson.side, side, &mut draw);
+        let mut frame = Frame::drawn(lesson.side, side, &mut draw);
+        if let Some(mark) = about {
+            frame.show(lesson, mark, &mut draw);
+        }
         let light = frame.sampled(&lesson.light, lesson.side, |sixteen| {
             sixteen.into_iter().map(|(l, w)| w * l).sum::<Vec3>()
         });
@@ -118,16 +141,32 @@ impl Sample {
         let lines: Vec<Vec<Mouth>> = lesson.courses.iter().map(|c| placed(c, &frame)).collect();
         let mut sample = Self {
             sight: Sight::new(&roots.map(|r| r * r), &roots.map(|_| true), &Job::default())?,
-            counts: roots.map(|_| true),
+            counts: roots.map(|_| [true; MARKS]),
             truth,
+            grey: roots.map(luminance),
         };
-        sample.draw_cracks(&lines, &roots.map(luminance));
+        sample.draw_cracks(&lines);
         Ok(sample)
+    }
+
+    /// A stain is where it covers enough to be seen; lime on what is as pale counts neither as
+    /// efflorescence nor as none.
+    pub(super) fn judge_stains(&mut self) {
+        let lime = self.truth.map(|t| f64::from(t[LIME]));
+        let pale = brighter(&self.grey.map(f64::from), &lime);
+        for (i, truth) in self.truth.data.iter_mut().enumerate() {
+            for stain in [RUST, LIME] {
+                truth[stain] = f32::from(u8::from(truth[stain] > COVERED));
+            }
+            let seen = pale.data[i] > BRIGHTER;
+            self.counts.data[i][LIME] = seen == (truth[LIME] > 0.5) || lime.data[i] < 0.05;
+        }
     }
 
     /// Cracks are as wide as they are, at least three pixels; one that is too faint to be seen
     /// counts neither as a crack nor as none.
-    fn draw_cracks(&mut self, lines: &[Vec<Mouth>], grey: &Grid<f32>) {
+    fn draw_cracks(&mut self, lines: &[Vec<Mouth>]) {
+        let grey = &self.grey;
         let wide = self.truth.map(|t| t[0] > 0.4);
         let spall = self.truth.map(|t| t[1] > 0.5);
         let width = grey.width;
@@ -149,12 +188,12 @@ impl Sample {
                 .map(move |(u, v)| v as usize * width + u as usize)
         };
         for i in course.pixels().into_iter().filter(|&i| !seen.data[i]) {
-            near(i, 3).for_each(|j| self.counts.data[j] = false);
+            near(i, 3).for_each(|j| self.counts.data[j][0] = false);
         }
         for i in course.pixels().into_iter().filter(|&i| seen.data[i]) {
             near(i, 1).for_each(|j| {
                 self.truth.data[j][0] = 1.0;
-                self.counts.data[j] = true;
+                self.counts.data[j][0] = true;
             });
         }
         for i in wide.pixels() {
@@ -190,6 +229,38 @@ fn pixel(at: Vec2, grid: &Grid<f32>) -> Option<usize> {
     inside.then(|| at.y as usize * grid.width + at.x as usize)
 }
 
+/// Places of stains among the kinds.
+const RUST: usize = Mark::Rust as usize;
+const LIME: usize = Mark::Efflorescence as usize;
+/// Share that a stain must cover to be one.
+pub(super) const COVERED: f32 = 0.3;
+/// By what share the root of light of lime must be above what is around it to be seen.
+const BRIGHTER: f64 = 0.05;
+/// Half side of the squares that are around lime.
+const NEAR: usize = 24;
+
+/// By what share each place is brighter than what is bare around it; 0 where nothing is.
+fn brighter(tone: &Grid<f64>, covered: &Grid<f64>) -> Grid<f64> {
+    let bare = covered.map(|c| f64::from(u8::from(c < 0.1)));
+    let number = boxed(&bare, NEAR);
+    let sum = boxed(&times(tone, &bare), NEAR);
+    let [own, area] = [boxed(tone, 2), boxed(&tone.map(|_| 1.0), 2)];
+    let of = |i: usize| {
+        let around = sum.data[i] / number.data[i].max(1.0);
+        if number.data[i] < 20.0 {
+            0.0
+        } else {
+            own.data[i] / area.data[i] / around.max(1e-6) - 1.0
+        }
+    };
+    Grid { width: tone.width, height: tone.height, data: (0..tone.data.len()).map(of).collect() }
+}
+
+fn times(a: &Grid<f64>, b: &Grid<f64>) -> Grid<f64> {
+    let data = a.data.iter().zip(&b.data).map(|(a, b)| a * b).collect();
+    Grid { width: a.width, height: a.height, data }
+}
+
 /// Contrast of a line to the scatter around it below which nobody would draw it.
 const FAINTEST: f32 = 0.55;
 /// Half sides of the squares over which a line's tone and that of its surroundings are averaged.
@@ -199,10 +270,6 @@ const AROUND: usize = 14;
 /// Where a course is to be seen: its tone, averaged along it, against what is around it.
 fn seen(course: &Grid<bool>, wide: &Grid<bool>, grey: &Grid<f32>) -> Grid<bool> {
     let number = |mask: &Grid<bool>| mask.map(|m| f64::from(u8::from(m)));
-    let times = |a: &Grid<f64>, b: &Grid<f64>| -> Grid<f64> {
-        let data = a.data.iter().zip(&b.data).map(|(a, b)| a * b).collect();
-        Grid { width: a.width, height: a.height, data }
-    };
     let tone = grey.map(f64::from);
     let on = number(course);
     let mut near = boxed(&on, 2);
@@ -277,9 +344,9 @@ mod tests {
         let count = |depth: f32| {
             let (mut cracks, mut spared) = (0, 0);
             for seed in 0..20 {
-                let sample = Sample::drawn(&lesson(depth), 128, Key::new(seed, 0)).unwrap();
+                let sample = Sample::drawn(&lesson(depth), 128, None, Key::new(seed, 0)).unwrap();
                 cracks += sample.truth.data.iter().filter(|t| t[0] > 0.5).count();
-                spared += sample.counts.data.iter().filter(|&&c| !c).count();
+                spared += sample.counts.data.iter().filter(|c| !c[0]).count();
             }
             (cracks, spared)
         };

@@ -8,7 +8,7 @@
 use glam::Vec3;
 use intrados_raster::{Grid, Mask};
 
-use super::{Mark, Marks, outline};
+use super::outline;
 
 /// Shortest side of a picture that is looked at, pixels.
 pub(super) const SMALLEST: usize = 32;
@@ -24,33 +24,27 @@ const REGION: usize = 512;
 /// Nothing is surer than that.
 const SUREST: f32 = 0.004;
 
-impl Marks {
-    /// What was seen at all scales, from the whole to the smallest, as one. What is not known
-    /// shows nothing.
-    pub(super) fn together(mut looks: Vec<Self>, known: &Mask) -> Self {
-        for grid in looks.iter_mut().flat_map(|look| &mut look.grids) {
-            grid.data.iter_mut().for_each(|p| *p = logit(*p));
-        }
-        let size = [known.width, known.height];
-        let regions = Regions::of(size);
-        let views = clearest(&looks, known, &regions);
-        let grids = Mark::ALL.map(|mark| {
-            let scores = Scores::of(&looks, mark);
-            let view = |i: usize| match mark {
-                Mark::Crack => VIEWS[views[regions.at(i)]],
-                _ => VIEWS[0],
-            };
-            let chance = |i: usize| if known.data[i] { scores.chance(i, view(i)) } else { 0.0 };
-            let data = (0..size[0] * size[1]).map(chance).collect();
-            Grid { width: size[0], height: size[1], data }
-        });
-        Self { grids }
+/// Cracks as they were seen at all scales, from the whole to the smallest, as one. What is not
+/// known shows nothing.
+pub(super) fn together(mut looks: Vec<Grid<f32>>, known: &Mask) -> Grid<f32> {
+    for look in &mut looks {
+        look.data.iter_mut().for_each(|p| *p = logit(*p));
     }
+    let size = [known.width, known.height];
+    let regions = Regions::of(size);
+    let views = clearest(&looks, known, &regions);
+    let scores = Scores(&looks);
+    let chance = |i: usize| match known.data[i] {
+        true => scores.chance(i, VIEWS[views[regions.at(i)]]),
+        false => 0.0,
+    };
+    let data = (0..size[0] * size[1]).map(chance).collect();
+    Grid { width: size[0], height: size[1], data }
 }
 
 /// Which view is to be trusted in each region.
-fn clearest(looks: &[Marks], known: &Mask, regions: &Regions) -> Vec<usize> {
-    let scores = Scores::of(looks, Mark::Crack);
+fn clearest(looks: &[Grid<f32>], known: &Mask, regions: &Regions) -> Vec<usize> {
+    let scores = Scores(looks);
     let mut best = vec![(0, 0.0_f64); regions.number()];
     // A view that has not all its scales is none.
     let views = VIEWS.iter().filter(|view| view[looks.len()..].iter().all(|share| *share == 0.0));
@@ -98,30 +92,21 @@ impl Regions {
     }
 }
 
-/// The logits of a mark at all scales.
-struct Scores<'a> {
-    width: usize,
-    scales: Vec<&'a Grid<f32>>,
-}
+/// The logits of cracks at all scales.
+struct Scores<'a>(&'a [Grid<f32>]);
 
-impl<'a> Scores<'a> {
-    fn of(looks: &'a [Marks], mark: Mark) -> Self {
-        Self {
-            width: looks[0].of(mark).width,
-            scales: looks.iter().map(|look| look.of(mark)).collect(),
-        }
-    }
-
-    /// How probable the mark is by a view; what a scale counts that was not looked at counts the
+impl Scores<'_> {
+    /// How probable a crack is by a view; what a scale counts that was not looked at counts the
     /// whole.
     fn chance(&self, i: usize, view: [f32; SCALES]) -> f32 {
-        let own = self.scales[0].data[i];
+        let width = self.0[0].width;
+        let own = self.0[0].data[i];
         let mut score = view[0] * own;
         for (k, share) in view.into_iter().enumerate().skip(1).filter(|(_, share)| *share > 0.0) {
             let shrunk = (1 << k) as f32;
             score += share
-                * self.scales.get(k).map_or(own, |grid| {
-                    let at = [i % self.width, i / self.width];
+                * self.0.get(k).map_or(own, |grid| {
+                    let at = [i % width, i / width];
                     between(grid, at.map(|p| (p as f32 + 0.5) / shrunk - 0.5))
                 });
         }
@@ -168,7 +153,7 @@ mod tests {
 
     /// A sure line across the left half of a picture of two regions, and crumbs that are half sure
     /// in the right one, as the network might have seen them at each scale.
-    fn looks(width: usize, height: usize, sure: [f32; SCALES]) -> Vec<Marks> {
+    fn looks(width: usize, height: usize, sure: [f32; SCALES]) -> Vec<Grid<f32>> {
         let look = |k: usize| {
             let (w, h) = (width >> k, height >> k);
             let chance = |i: usize| {
@@ -177,12 +162,7 @@ mod tests {
                 let is_line = y.abs_diff(h / 2) <= 4 >> k && x < w / 2;
                 if is_line { sure[k] } else { 0.3 * f32::from(u8::from(crumb)) }
             };
-            let crack = Grid { width: w, height: h, data: (0..w * h).map(chance).collect() };
-            Marks {
-                grids: std::array::from_fn(|m| {
-                    if m == 0 { crack.clone() } else { Grid::new(w, h, 0.0) }
-                }),
-            }
+            Grid { width: w, height: h, data: (0..w * h).map(chance).collect() }
         };
         (0..SCALES).map(look).collect()
     }
@@ -197,12 +177,12 @@ mod tests {
             [([0.99, 0.99, 0.99], 0), ([0.2, 0.996, 0.6], 1), ([0.1, 0.3, 0.99], 2)]
         {
             let mut looks = looks(width, height, sure);
-            let marks = Marks::together(looks.clone(), &known);
-            for grid in looks.iter_mut().flat_map(|look| &mut look.grids) {
-                grid.data.iter_mut().for_each(|p| *p = logit(*p));
+            let cracks = outline::lines(&together(looks.clone(), &known), outline::CRACKS);
+            for look in &mut looks {
+                look.data.iter_mut().for_each(|p| *p = logit(*p));
             }
             assert_eq!(clearest(&looks, &known, &regions), [expected, 0], "{sure:?}");
-            assert!(marks.cracks().count() > 200, "{sure:?}");
+            assert!(cracks.count() > 200, "{sure:?}");
         }
     }
 
@@ -212,8 +192,6 @@ mod tests {
         let mut looks = looks(64, 40, [0.99; SCALES]);
         looks.truncate(1);
         let known = Mask { width: 64, height: 40, data: vec![true; 64 * 40] };
-        let marks = Marks::together(looks, &known);
-        assert!((marks.of(Mark::Crack).data[20 * 64 + 10] - 0.99).abs() < 1e-3);
-        assert!(marks.of(Mark::Rust).data.iter().all(|p| *p < 0.01));
+        assert!((together(looks, &known).data[20 * 64 + 10] - 0.99).abs() < 1e-3);
     }
 }
