@@ -93,6 +93,8 @@ pub enum Action {
     Play,
     /// Bring a panel to the front, by its name; it is opened where it was closed.
     Tab(&'static str),
+    /// Show the picture of light, in the expert's layout; which layout structures open in stays.
+    Light,
     /// Open a panel, or close it.
     Panel(String, bool),
     /// Go to a layout.
@@ -265,6 +267,7 @@ fn carry_out(world: &mut World, action: Action) {
         Action::Jump(to) => play::jump(world, to),
         Action::Play => play::toggle(world),
         Action::Tab(name) => show_tab(world, name),
+        Action::Light => world.resource_mut::<Desk>().light(),
         Action::Panel(name, true) => show_tab(world, &name),
         Action::Panel(name, false) => world.resource_mut::<Desk>().close(&name),
         Action::Arrange(workspace) => world.resource_mut::<Desk>().choose(workspace),

@@ -344,6 +344,31 @@ fn a_foreign_panel_appears_in_its_place() {
     assert_eq!(window.harness.query_all_by_label("2.5 mGy").count(), 2);
 }
 
+/// Of a scene without members the picture of light is in front, whatever was before; an inspector
+/// has a button that goes there, and structures open in the layout that was chosen.
+#[test]
+fn a_scene_without_members_shows_its_light() {
+    let mut window = Window::with_scene("cornell");
+    let draws = |window: &Window| window.harness.query_by_label("⏸ Pause").is_some();
+    window.click("Structure");
+    assert!(!draws(&window));
+    window.ask(Action::Open("slit".into()));
+    window.until("slit", |w| w.resource::<CurrentScene>().0.name == "slit");
+    window.frames(3);
+    assert!(draws(&window), "it opened on a picture with nothing in it");
+    window.ask(Action::Arrange(Workspace::Inspector));
+    window.frames(3);
+    // In the picture, and in the sheet.
+    assert_eq!(window.harness.query_all_by_label("Look at its light").count(), 2);
+    window.harness.query_all_by_label("Look at its light").next().expect("a way").click();
+    window.frames(3);
+    assert!(draws(&window));
+    window.ask(Action::Open("column".into()));
+    window.until("column", |w| w.resource::<CurrentScene>().0.name == "column");
+    window.frames(3);
+    assert!(window.harness.query_by_label("Damage of members").is_some());
+}
+
 #[test]
 fn every_tab_draws() {
     let mut window = Window::with_scene("column");

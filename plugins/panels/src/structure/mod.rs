@@ -269,7 +269,12 @@ pub(crate) fn structure(
     structure.model.slide(selection.0.filter(|_| form.is_open));
     structure.place = structure.place.filter(|_| form.is_open);
     let pointed = structure.model.show(ui, rect, scene, coloured, scale, *selection, section, jobs);
-    let Some(pointed) = pointed else { return };
+    let Some(pointed) = pointed else {
+        if scene.members.is_empty() {
+            to_light(ui, whole, &mut actions);
+        }
+        return;
+    };
     if pointed.response.dragged() {
         structure.flight.iter_mut().for_each(Flight::rest);
     }
@@ -303,6 +308,15 @@ pub(crate) fn structure(
             flown(ui, structure, scene, *selection, &mut actions);
         });
     });
+}
+
+/// The way out of a picture with nothing in it.
+fn to_light(ui: &mut Ui, rect: Rect, actions: &mut Actions) {
+    let size = vec2(200.0_f32.min(rect.width()), 24.0);
+    let at = Rect::from_center_size(rect.center() + vec2(0.0, 30.0), size);
+    if ui.put(at, egui::Button::new(tr!("Look at its light"))).clicked() {
+        actions.ask(Action::Light);
+    }
 }
 
 /// The structure as an earlier prediction has it, from the same side.
