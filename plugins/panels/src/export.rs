@@ -17,9 +17,9 @@ use intrados_stage::{
 use crate::{
     Action, Actions, Log, Look, Quantity,
     fields::{self, Fields, Painted},
-    lang::{fixed, local, term},
+    lang::{local, term},
     legend::{Legend, put_under},
-    number::significant,
+    number::{count, plus_minus, significant},
     picture,
 };
 
@@ -142,17 +142,14 @@ fn save(
             };
             let image = painted.map_or_else(film, |painted| painted.image.clone());
             let legend = legend(look, painted).map(|legend| legend.drawn(ui, image.width()));
-            let done = format!(
-                "{}: {}",
-                path.display(),
-                describe(render, look, painted.map(|painted| painted.scale.range))
-            );
+            let what = describe(render, look, painted.map(|painted| painted.scale.range));
             Task::spawn(jobs, label, move |_| {
                 let image = match &legend {
                     Some(legend) => put_under(&image, legend),
                     None => image,
                 };
-                write_png(&image, &path).map(|()| done).map_err(|e| e.to_string())
+                write_png(&image, &path, &what).map_err(|e| e.to_string())?;
+                Ok(format!("{}: {what}", path.display()))
             })
         }
     }
@@ -201,27 +198,37 @@ fn describe(render: &Render, look: &Look, range: Option<[f32; 2]>) -> String {
         }
     };
     let order = look.order.map_or_else(|| tr!("all bounces"), |order| tr!("bounce {}", order));
+    let mean = render.summary().combined;
     tr!(
-        "{}: {}, {}, {} view; {} samples a pixel; scene hash {}; Intrados {}",
+        "{}: {}, {}, {} view; {} samples a pixel, seed {}, mean of the picture {}; scene hash {}; Intrados {}",
         scene.name,
         what,
         order,
         term(&format!("{:?}", look.view)),
-        fixed(render.samples_per_pixel(), 0),
+        count(render.samples_per_pixel()),
+        render.exposures().iter().flatten().next().map_or(0, |exposure| exposure.seed),
+        plus_minus(mean.mean, mean.std_error, "W/(m² sr)"),
         scene.hash,
         env!("CARGO_PKG_VERSION")
     )
 }
 
-pub(crate) fn write_png(
-    pixels: &ColorImage,
-    path: &Path,
-) -> Result<(), Box<dyn std::error::Error>> {
+/// Writes a picture, and in it by what it was made and `what` it shows: a picture that is sent on
+/// has no other page to say so.
+pub(crate) fn write_png(pixels: &ColorImage, path: &Path, what: &str) -> Result<(), Box<dyn Error>> {
     let rgb: Vec<u8> = pixels.pixels.iter().flat_map(|c| [c.r(), c.g(), c.b()]).collect();
     let (w, h) = (u32::try_from(pixels.width())?, u32::try_from(pixels.height())?);
     let mut file = Unfinished::begin(path)?;
-    let png = image::codecs::png::PngEncoder::new(&mut file);
-    image::ImageEncoder::write_image(png, &rgb, w, h, image::ExtendedColorType::Rgb8)?;
+    let mut encoder = png::Encoder::new(&mut file, w, h);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
+    let by = concat!("Intrados ", env!("CARGO_PKG_VERSION"));
+    encoder.add_itxt_chunk("Software".into(), by.into())?;
+    encoder.add_itxt_chunk("Description".into(), what.into())?;
+    let mut writer = encoder.write_header()?;
+    writer.write_image_data(&rgb)?;
+    writer.finish()?;
     Ok(file.finish()?)
 }
 

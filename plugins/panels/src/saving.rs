@@ -262,8 +262,9 @@ pub(crate) fn picture(ui: &Ui, world: &mut World) {
         };
         match path {
             Some(path) => {
+                let what = described(world);
                 let mut jobs = world.resource_mut::<Jobs>();
-                saving.task = Some(write_picture(&mut jobs, part, path));
+                saving.task = Some(write_picture(&mut jobs, part, path, what));
             }
             None => {
                 ui.ctx().copy_image(part);
@@ -275,13 +276,22 @@ pub(crate) fn picture(ui: &Ui, world: &mut World) {
     *world.resource_mut::<Saving>() = saving;
 }
 
+/// What a picture of the window is of.
+fn described(world: &World) -> String {
+    world.get_resource::<CurrentScene>().map_or_else(String::new, |scene| {
+        let (name, hash) = (&scene.0.name, &scene.0.hash);
+        tr!("{}; scene hash {}; Intrados {}", name, hash, env!("CARGO_PKG_VERSION"))
+    })
+}
+
 fn write_picture(
     jobs: &mut Jobs,
     picture: ColorImage,
     path: PathBuf,
+    what: String,
 ) -> Task<Result<Written, String>> {
     Task::spawn(jobs, tr!("writing {}", path.display()), move |_| {
-        write_png(&picture, &path).map_err(|e| format!("{}: {e}", path.display()))?;
+        write_png(&picture, &path, &what).map_err(|e| format!("{}: {e}", path.display()))?;
         Ok(Written { files: None, path })
     })
 }

@@ -899,6 +899,13 @@ fn the_picture_is_written_as_png() {
     let folder = tempfile::tempdir().expect("a folder for the picture");
     let file = folder.path().join("view.png");
     export(&mut window, &file);
+    // And says what it shows, by what it was made, and of which scene.
+    let hash = window.with(|w| w.resource::<CurrentScene>().0.hash.clone());
+    let written = std::fs::read(&file).expect("a picture");
+    for said in ["Software", "Intrados ", "samples a pixel, seed ", hash.as_str()] {
+        let bytes = said.as_bytes();
+        assert!(written.windows(bytes.len()).any(|w| w == bytes), "it does not say {said:?}");
+    }
 }
 
 /// Opens the Stress tab for member `index` with elements of `element` metres.
