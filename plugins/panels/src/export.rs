@@ -15,12 +15,13 @@ use intrados_stage::{
 };
 
 use crate::{
-    Action, Actions, Log, Look, Quantity,
+    Action, Actions, Banners, Log, Look, Quantity,
     fields::{self, Fields, Painted},
     lang::{local, term},
     legend::{Legend, put_under},
     number::{count, plus_minus, significant},
     picture,
+    toast::Toasts,
 };
 
 /// Writes a film to a file, or says why it cannot.
@@ -35,7 +36,13 @@ pub struct Exporter(pub Arc<Write>);
 pub(crate) struct Export {
     pub(crate) shown: bool,
     pub(crate) path: String,
-    task: Option<Task<Result<String, String>>>,
+    task: Option<Task<Result<Written, String>>>,
+}
+
+/// Where a picture was written, and what it shows.
+struct Written {
+    path: String,
+    what: String,
 }
 
 impl Export {
@@ -87,10 +94,10 @@ pub(crate) fn sheet(
         ("exr", _, None) => Some(tr!("This build writes no EXR; use `intrados render`.")),
         _ => Some(tr!("The name must end in .png or .exr.")),
     };
+    let is_writing = export.task.is_some().then(|| tr!("Another file is being written."));
+    let problem = problem.or(is_writing);
     ui.horizontal(|ui| {
-        if ui
-            .add_enabled(problem.is_none() && export.task.is_none(), egui::Button::new(tr!("Save")))
-            .clicked()
+        if ui.add_enabled(problem.is_none(), egui::Button::new(tr!("Save"))).clicked()
             && let Some(render) = render
         {
             export.shown = false;
@@ -118,14 +125,14 @@ fn save(
     fields: &Fields,
     exporter: Option<&Exporter>,
     path: PathBuf,
-) -> Task<Result<String, String>> {
+) -> Task<Result<Written, String>> {
     let label = tr!("writing {}", path.display());
     match exporter.cloned() {
         Some(exporter) => {
             let render = render.clone();
             Task::spawn(jobs, label, move |_| {
-                let written = (exporter.0)(&render, &path);
-                written.map(|()| path.display().to_string()).map_err(|e| e.to_string())
+                (exporter.0)(&render, &path).map_err(|e| e.to_string())?;
+                Ok(Written { path: path.display().to_string(), what: String::new() })
             })
         }
         None => {
@@ -149,7 +156,7 @@ fn save(
                     None => image,
                 };
                 write_png(&image, &path, &what).map_err(|e| e.to_string())?;
-                Ok(format!("{}: {what}", path.display()))
+                Ok(Written { path: path.display().to_string(), what })
             })
         }
     }
@@ -232,12 +239,25 @@ pub(crate) fn write_png(pixels: &ColorImage, path: &Path, what: &str) -> Result<
     Ok(file.finish()?)
 }
 
-/// Says how a write ended.
-pub(crate) fn take(mut export: ResMut<Export>, mut log: ResMut<Log>) {
+/// Says how a write ended: what could not be written must not be overlooked.
+pub(crate) fn take(
+    mut export: ResMut<Export>,
+    mut banners: ResMut<Banners>,
+    mut toasts: ResMut<Toasts>,
+    mut log: ResMut<Log>,
+) {
     let Some(done) = Task::take(&mut export.task) else { return };
     match done {
-        Ok(Ok(what)) => log.say(tr!("wrote {}", what)),
-        Ok(Err(error)) => log.say(tr!("the picture was not written: {}", term(&error.to_string()))),
+        Ok(Ok(Written { path, what })) => {
+            let separator = if what.is_empty() { "" } else { ": " };
+            log.say(tr!("wrote {}", format!("{path}{separator}{what}")));
+            toasts.say(tr!("Saved {}", path));
+        }
+        Ok(Err(why)) => {
+            log.say(tr!("the picture was not written: {}", term(&why)));
+            banners.cannot(&tr!("Not saved"), &why);
+        }
+        // What a panic said is told with all others.
         Err(_) => log.say(tr!("the picture was not written: the writer broke off")),
     }
 }

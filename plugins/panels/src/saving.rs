@@ -45,7 +45,8 @@ pub(crate) struct Saving {
     shown: Option<Taken>,
     path: String,
     with_pdf: bool,
-    task: Option<Task<Result<Written, String>>>,
+    /// None: somebody cancelled it.
+    task: Option<Task<Result<Option<Written>, String>>>,
     /// A picture that is to be taken of the window, once it is drawn; without a file for the
     /// clipboard.
     wanted: Option<(Option<PathBuf>, Option<Rect>)>,
@@ -178,12 +179,13 @@ pub(crate) fn sheet(
         Some(tr!("It needs a name."))
     } else if needs && result.is_none() {
         Some(tr!("The prediction is not done yet."))
+    } else if saving.task.is_some() {
+        Some(tr!("Another file is being written."))
     } else {
         None
     };
     ui.horizontal(|ui| {
-        let may = why_not.is_none() && saving.task.is_none();
-        if ui.add_enabled(may, Button::new(tr!("Save"))).clicked() {
+        if ui.add_enabled(why_not.is_none(), Button::new(tr!("Save"))).clicked() {
             let path = PathBuf::from(saving.path.trim());
             match (what, result) {
                 (Taken::Picture(panel), _) => actions.ask(Action::TakePicture(path, panel)),
@@ -225,12 +227,12 @@ fn table(
     path: PathBuf,
     make: impl FnOnce() -> String + Send + 'static,
     jobs: &mut Jobs,
-) -> Task<Result<Written, String>> {
+) -> Task<Result<Option<Written>, String>> {
     Task::spawn(jobs, tr!("writing {}", path.display()), move |_| {
         let text = make();
         let written = file::put(&path, |out| out.write_all(text.as_bytes()));
         written.map_err(|e| format!("{}: {e}", path.display()))?;
-        Ok(Written { files: None, path })
+        Ok(Some(Written { files: None, path }))
     })
 }
 
@@ -289,10 +291,10 @@ fn write_picture(
     picture: ColorImage,
     path: PathBuf,
     what: String,
-) -> Task<Result<Written, String>> {
+) -> Task<Result<Option<Written>, String>> {
     Task::spawn(jobs, tr!("writing {}", path.display()), move |_| {
         write_png(&picture, &path, &what).map_err(|e| format!("{}: {e}", path.display()))?;
-        Ok(Written { files: None, path })
+        Ok(Some(Written { files: None, path }))
     })
 }
 
@@ -315,7 +317,8 @@ pub(crate) fn take(
 ) {
     let Some(done) = Task::take(&mut saving.bypass_change_detection().task) else { return };
     match done {
-        Ok(Ok(Written { files, path })) => {
+        Ok(Ok(None)) => log.say(tr!("saving was cancelled")),
+        Ok(Ok(Some(Written { files, path }))) => {
             let path = path.display();
             let what = files.map_or_else(|| path.to_string(), |n| tr!("{} files into {}", n, path));
             toasts.say(tr!("Saved {}", what));

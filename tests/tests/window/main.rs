@@ -908,6 +908,20 @@ fn the_picture_is_written_as_png() {
     }
 }
 
+/// What cannot be written is said where nobody overlooks it.
+#[test]
+fn a_picture_that_cannot_be_written_has_a_banner() {
+    let mut window = Window::with_scene("cornell");
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("no_folder");
+    std::fs::write(&file, "").expect("written");
+    window.ask(Action::Export);
+    window.frames(3);
+    type_into(&mut window, "File name", &file.join("view.png").display().to_string());
+    window.click("Save");
+    window.until_seen("⚠ Not saved:");
+}
+
 /// Opens the Stress tab for member `index` with elements of `element` metres.
 fn stress_of(window: &mut Window, index: usize, element: f64) {
     window.ask(Action::Select(Some(index)));
