@@ -231,6 +231,8 @@ pub(crate) fn keys(ui: &Ui, world: &mut World) {
     let is_typing = ui.ctx().text_edit_focused();
     // A button that has the focus is pressed by it.
     let has_focus = ui.ctx().memory(|m| m.focused().is_some());
+    // A menu that is open is put away by it, and nothing else is.
+    let has_menu = egui::Popup::is_any_open(ui.ctx());
     let commands = fixed(world.resource::<Look>());
     let acts_anywhere = |modifiers: Modifiers, key: Key| {
         modifiers.command && !matches!(key, Key::Z | Key::Y | Key::Home | Key::End)
@@ -239,7 +241,9 @@ pub(crate) fn keys(ui: &Ui, world: &mut World) {
     let asked: Vec<Action> = ui.input_mut(|i| {
         let own = commands.into_iter().filter_map(|c| Some((c.shortcut?, c.action)));
         own.filter(|((modifiers, key), _)| {
-            let is_taken = is_typing || has_focus && *key == Key::Space;
+            let is_taken = is_typing
+                || has_focus && *key == Key::Space
+                || has_menu && *key == Key::Escape;
             if is_taken && !acts_anywhere(*modifiers, *key) {
                 return false;
             }

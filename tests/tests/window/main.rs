@@ -301,6 +301,23 @@ fn a_click_in_the_tree_selects_a_member() {
     assert_eq!(window.with(|w| *w.resource::<Selection>()), Selection(None));
 }
 
+/// Escape in a menu puts the menu away, and only the next one what lies below.
+#[test]
+fn escape_in_a_menu_leaves_the_selection() {
+    let mut window = with_column();
+    window.ask(Action::Select(Some(0)));
+    window.frames(2);
+    window.click("View");
+    assert!(window.harness.query_by_label("Light theme").is_some(), "the menu is not open");
+    window.harness.key_press(Key::Escape);
+    window.frames(3);
+    assert!(window.harness.query_by_label("Light theme").is_none(), "the menu is still open");
+    assert_eq!(window.with(|w| *w.resource::<Selection>()), Selection(Some(0)));
+    window.harness.key_press(Key::Escape);
+    window.frames(2);
+    assert_eq!(window.with(|w| *w.resource::<Selection>()), Selection(None));
+}
+
 #[test]
 fn a_bad_file_shows_a_banner_that_can_be_dismissed_and_the_old_scene_stays() {
     let mut window = Window::with_scene("cornell");
