@@ -222,7 +222,11 @@ fn describe(render: &Render, look: &Look, range: Option<[f32; 2]>) -> String {
 
 /// Writes a picture, and in it by what it was made and `what` it shows: a picture that is sent on
 /// has no other page to say so.
-pub(crate) fn write_png(pixels: &ColorImage, path: &Path, what: &str) -> Result<(), Box<dyn Error>> {
+pub(crate) fn write_png(
+    pixels: &ColorImage,
+    path: &Path,
+    what: &str,
+) -> Result<(), Box<dyn Error>> {
     let rgb: Vec<u8> = pixels.pixels.iter().flat_map(|c| [c.r(), c.g(), c.b()]).collect();
     let (w, h) = (u32::try_from(pixels.width())?, u32::try_from(pixels.height())?);
     let mut file = Unfinished::begin(path)?;

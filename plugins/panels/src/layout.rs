@@ -347,7 +347,7 @@ fn menu(ui: &mut Ui, world: &mut World) {
         if ui.button(tr!("Commands")).on_hover_text("Ctrl+P").clicked() {
             asked.push(Action::Palette);
         }
-        if ui.button(tr!("Keys")).on_hover_text(tr!("F1 or ?")).clicked() {
+        if ui.button(tr!("Keys")).on_hover_text(tr!("F1, ? or H")).clicked() {
             asked.push(Action::Keys);
         }
         if let Some(scene) = scene {

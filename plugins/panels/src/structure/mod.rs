@@ -43,13 +43,38 @@ pub(crate) enum View {
     Along(Vec3),
 }
 
-/// Sides, by their names.
-fn sides() -> [(String, Vec3); 3] {
-    [
-        (tr!("Front|view"), Vec3::new(0.0, 0.06, 1.0)),
-        (tr!("Side|view"), Vec3::new(1.0, 0.06, 0.0)),
-        (tr!("Top|view"), Vec3::new(0.0, 1.0, 0.02)),
-    ]
+/// A side that a structure is looked at from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Aspect {
+    /// Along z.
+    Front,
+    /// Along x.
+    Side,
+    /// From above.
+    Top,
+}
+
+impl Aspect {
+    /// All of them, each with its key.
+    const ALL: [(Self, &'static str); 3] =
+        [(Self::Front, "1"), (Self::Side, "3"), (Self::Top, "7")];
+
+    fn name(self) -> String {
+        match self {
+            Self::Front => tr!("Front|view"),
+            Self::Side => tr!("Side|view"),
+            Self::Top => tr!("Top|view"),
+        }
+    }
+
+    /// From there to the middle.
+    fn axis(self) -> Vec3 {
+        match self {
+            Self::Front => Vec3::new(0.0, 0.06, 1.0),
+            Self::Side => Vec3::new(1.0, 0.06, 0.0),
+            Self::Top => Vec3::new(0.0, 1.0, 0.02),
+        }
+    }
 }
 
 /// What the panel remembers.
@@ -99,6 +124,15 @@ impl Default for Structure {
 impl Structure {
     pub(crate) fn look(&mut self, view: View) {
         self.wished = Some(view);
+    }
+
+    pub(crate) fn look_from(&mut self, aspect: Aspect) {
+        self.look(View::Along(aspect.axis()));
+    }
+
+    /// Hides the scale of colours, which may lie over a member, or shows it again.
+    pub(crate) fn swap_legend(&mut self) {
+        self.model.swap_legend();
     }
 
     /// Where it is looked at from, once that is known.
@@ -522,9 +556,9 @@ fn views(ui: &mut Ui, structure: &mut Structure, selection: Selection, actions: 
     if ui.toggle_value(&mut is_parallel, tr!("Parallel")).on_hover_text(hint).changed() {
         structure.model.narrow(is_parallel);
     }
-    for (name, axis) in sides() {
-        if ui.button(name).clicked() {
-            structure.look(View::Along(axis));
+    for (aspect, key) in Aspect::ALL {
+        if ui.button(aspect.name()).on_hover_text(key).clicked() {
+            structure.look_from(aspect);
         }
     }
 }
