@@ -300,7 +300,9 @@ pub(crate) fn sheet(ui: &Ui, world: &mut World) {
         .anchor(egui::Align2::CENTER_CENTER, [0.0, 0.0])
         .open(&mut open)
         .show(ui.ctx(), |ui| {
-            ScrollArea::vertical().max_height(height).show(ui, |ui| {
+            // As high as the window lets it be: egui's own windows begin with half of that.
+            let area = ScrollArea::vertical().max_height(height).min_scrolled_height(height);
+            area.show(ui, |ui| {
                 egui::Grid::new("keys").num_columns(2).striped(true).show(ui, |ui| {
                     for (keys, what) in &rows {
                         ui.strong(keys);
