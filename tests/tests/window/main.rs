@@ -386,6 +386,26 @@ fn a_scene_without_members_shows_its_light() {
     assert!(window.harness.query_by_label("Damage of members").is_some());
 }
 
+/// In a small window rows of tools wrap: what is at their ends stays in reach.
+#[test]
+fn a_small_window_has_all_tools_of_its_pictures() {
+    let mut window = Window::with_scene("column");
+    window.harness.set_size(egui::vec2(900.0, 600.0));
+    window.frames(6);
+    let ends = |window: &Window, tools: &[&str], beside: &str| {
+        let edge = window.harness.get_by_label(beside).rect().left();
+        for tool in tools {
+            let rect = window.harness.get_by_label(tool).rect();
+            assert!(rect.right() <= edge, "{tool} ends at {rect}, {beside} begins at {edge}");
+        }
+    };
+    ends(&window, &["Light", "Keep as reference", "Smoothed preview"], "Inspector");
+    window.ask(Action::Arrange(Workspace::Inspector));
+    window.ask(Action::Tab("Structure"));
+    window.frames(6);
+    ends(&window, &["Names", "Compare", "As it looks"], "Members");
+}
+
 #[test]
 fn every_tab_draws() {
     let mut window = Window::with_scene("column");

@@ -453,7 +453,8 @@ fn tools(
 ) {
     let frame = egui::Frame::popup(ui.style()).inner_margin(4);
     frame.show(ui, |ui| {
-        ui.horizontal(|ui| {
+        // In a narrow panel the tools at the end would be out of reach.
+        ui.horizontal_wrapped(|ui| {
             views(ui, structure, selection, actions);
             ui.toggle_value(&mut structure.names, tr!("Names"))
                 .on_hover_text(tr!("Name and damage of every member, the worst first"));
@@ -478,13 +479,13 @@ fn tools(
     if timeline.range().is_some() {
         let mut when = **moment;
         frame.show(ui, |ui| {
-            ui.horizontal(|ui| time::bar(ui, &mut when, timeline, is_playing, actions))
+            ui.horizontal_wrapped(|ui| time::bar(ui, &mut when, timeline, is_playing, actions))
         });
         moment.set_if_neq(when);
     }
     let bounds = structure.model.bounds();
     if let Some(section) = &mut structure.section {
-        frame.show(ui, |ui| ui.horizontal(|ui| section.tools(ui, bounds)));
+        frame.show(ui, |ui| ui.horizontal_wrapped(|ui| section.tools(ui, bounds)));
     }
     if structure.tape.is_on {
         frame.show(ui, |ui| {
@@ -509,7 +510,7 @@ fn flown(
     let frame = egui::Frame::popup(ui.style()).inner_margin(4);
     let member = selection.0.and_then(|index| scene.members.get(index));
     if let Some(flight) = &mut structure.flight {
-        let ends = frame.show(ui, |ui| ui.horizontal(|ui| flight.tools(ui)).inner).inner;
+        let ends = frame.show(ui, |ui| ui.horizontal_wrapped(|ui| flight.tools(ui)).inner).inner;
         if ends {
             structure.end_flight();
         }
