@@ -375,7 +375,8 @@ fn beside(
         structure.earlier.names(ui, rect, scene, &value, selection, &pointed.camera);
     }
     let font = egui::TextStyle::Body.resolve(ui.style());
-    let at = rect.left_bottom() + vec2(10.0, -28.0);
+    // Above the ruler.
+    let at = rect.left_bottom() + vec2(10.0, -44.0);
     let ink = ui.visuals().strong_text_color();
     ui.painter().with_clip_rect(rect).text(
         at,
