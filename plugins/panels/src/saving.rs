@@ -4,6 +4,7 @@ use std::{
     io::Write,
     path::{Path, PathBuf},
     sync::{Arc, Mutex, PoisonError, mpsc},
+    time::{Duration, Instant},
 };
 
 use bevy_ecs::prelude::*;
@@ -19,6 +20,9 @@ use intrados_stage::{
 use crate::{
     Action, Actions, Banners, Latest, Log, export::write_png, lang::term, report, toast::Toasts,
 };
+
+/// So long tools are put away for a picture: where the system gives none, they come back.
+const AWAY: Duration = Duration::from_secs(2);
 
 /// What can be saved.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -50,6 +54,8 @@ pub(crate) struct Saving {
     /// A picture that is to be taken of the window, once it is drawn; without a file for the
     /// clipboard.
     wanted: Option<(Option<PathBuf>, Option<Rect>)>,
+    /// Since when a picture is wanted.
+    since: Option<Instant>,
     /// Where it comes, once it was asked for.
     coming: Option<Mutex<mpsc::Receiver<Arc<ColorImage>>>>,
 }
@@ -92,7 +98,13 @@ impl Saving {
     /// Takes a picture of the window, or of what is at a place in it, in the next frame, for a file
     /// or for the clipboard.
     pub(crate) fn take_picture(&mut self, path: Option<PathBuf>, of: Option<Rect>) {
-        self.wanted = Some((path, of));
+        (self.wanted, self.since) = (Some((path, of)), Some(Instant::now()));
+    }
+
+    /// Whether a picture of a panel is being taken: its tools are not of it.
+    pub(crate) fn takes_panel(&self) -> bool {
+        self.wanted.as_ref().is_some_and(|(_, of)| of.is_some())
+            && self.since.is_some_and(|since| since.elapsed() < AWAY)
     }
 }
 

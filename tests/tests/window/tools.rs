@@ -80,6 +80,19 @@ fn lengths_are_written_in_the_unit_that_was_chosen() {
     assert!(feet.contains(" in (") && !feet.contains(" m"), "{feet}");
 }
 
+/// A picture of the structure that is saved has its legend, and none of the tools that lie over it.
+#[test]
+fn tools_are_put_away_for_a_picture_of_the_structure() {
+    let mut window = with_column();
+    assert!(window.harness.query_by_label("As it looks").is_some());
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("structure.png");
+    window.ask(Action::TakePicture(file, Some("Structure".into())));
+    window.frame();
+    assert!(window.harness.query_by_label("As it looks").is_none());
+    assert!(window.harness.query_by_label("Damage of members").is_some());
+}
+
 /// A digit is a side of the structure, but an estimator where the picture of light is seen; the
 /// legend goes and comes by a key, and so do the slices.
 #[test]

@@ -30,6 +30,7 @@ use crate::{
     lang::fixed,
     moment::{Courses, Moment, Seen, Timeline},
     play::Play,
+    saving::Saving,
 };
 
 /// Where the structure is looked at from.
@@ -261,6 +262,7 @@ pub(crate) fn structure(
     play: Res<Play>,
     mut light: Light<'_>,
     mut form: ResMut<Form>,
+    saving: Res<Saving>,
     mut jobs: ResMut<Jobs>,
     mut actions: ResMut<Actions>,
 ) {
@@ -329,6 +331,13 @@ pub(crate) fn structure(
     structure.place.iter().for_each(|at| measure::end(ui, rect, &pointed.camera, *at));
     let shown = Shown { latest: &latest, seen: &seen, when };
     point(structure, scene, &shown, pointed, form.bypass_change_detection(), &mut actions);
+    if saving.takes_panel() {
+        // Of the tools only what the slider says is part of what is seen.
+        if !when.is_now() {
+            time::write(ui, whole, when.years, &courses.timeline);
+        }
+        return;
+    }
     let bar = Rect::from_min_size(whole.min + vec2(8.0, 8.0), vec2(whole.width() - 16.0, 24.0));
     ui.scope_builder(egui::UiBuilder::new().max_rect(bar), |ui| {
         ui.vertical(|ui| {
