@@ -51,6 +51,7 @@ fn take(session: &Session, args: &args::Screenshot) -> Result<Outcome, Failure> 
         recent: None,
         layout: None,
         session: None,
+        log: None,
         views: None,
         language,
         ..PanelsPlugin::desktop()

@@ -11,8 +11,8 @@ use intrados_scene::{
 };
 
 use crate::{
-    Banners, Colours, Jump, Language, Lengths, Log, Look, Quantity, Refine, Selection, Viewpoint,
-    Workspace,
+    Aspect, Banners, Colours, Jump, Language, Lengths, Log, Look, Quantity, Refine, Selection,
+    Viewpoint, Workspace,
     attach::Form,
     command::Palette,
     create::Creation,
@@ -83,6 +83,12 @@ pub enum Action {
     KeepReference,
     /// Keep it no longer.
     LetReferenceGo,
+    /// Look at the structure from a side.
+    LookFrom(Aspect),
+    /// Hide the legend of the structure's picture, or show it.
+    Legend,
+    /// Show the next slice in the CT tab, or the one before.
+    StepSlice(bool),
     /// Select a member, or nothing.
     Select(Option<usize>),
     /// Select the next member of the list, or the one before.
@@ -93,6 +99,8 @@ pub enum Action {
     Play,
     /// Bring a panel to the front, by its name; it is opened where it was closed.
     Tab(&'static str),
+    /// Show the picture of light, in the expert's layout; which layout structures open in stays.
+    Light,
     /// Open a panel, or close it.
     Panel(String, bool),
     /// Go to a layout.
@@ -253,6 +261,11 @@ fn carry_out(world: &mut World, action: Action) {
             views.is_open = !views.is_open;
         }
         Action::Frame => frame(world),
+        Action::LookFrom(aspect) => {
+            world.resource_mut::<Structure>().look_from(aspect);
+            show_tab(world, "Structure");
+        }
+        Action::Legend => world.resource_mut::<Structure>().swap_legend(),
         Action::Fly => fly(world),
         Action::Show(view) => world.resource_mut::<Look>().view = view,
         Action::ShowQuantity(quantity) => world.resource_mut::<Look>().quantity = quantity,
@@ -265,6 +278,7 @@ fn carry_out(world: &mut World, action: Action) {
         Action::Jump(to) => play::jump(world, to),
         Action::Play => play::toggle(world),
         Action::Tab(name) => show_tab(world, name),
+        Action::Light => world.resource_mut::<Desk>().light(),
         Action::Panel(name, true) => show_tab(world, &name),
         Action::Panel(name, false) => world.resource_mut::<Desk>().close(&name),
         Action::Arrange(workspace) => world.resource_mut::<Desk>().choose(workspace),
@@ -282,6 +296,13 @@ fn carry_out(world: &mut World, action: Action) {
         Action::Quit => world.resource_mut::<Layout>().quits = true,
         Action::Slice(index) => {
             world.resource_mut::<Ct>().show(index);
+            show_tab(world, "CT");
+        }
+        Action::StepSlice(forward) => {
+            // What is not in sight yet is not passed over.
+            if world.resource::<Desk>().has_drawn("CT") {
+                world.resource_mut::<Ct>().step(forward);
+            }
             show_tab(world, "CT");
         }
         Action::Photograph(path) => {

@@ -102,9 +102,16 @@ pub(crate) fn gather(mut jobs: ResMut<Jobs>, mut banners: ResMut<Banners>, mut l
     }
 }
 
+/// What whoever mends it wants to know.
+fn details(banner: &Banner, log: Option<&str>) -> String {
+    let log = log.map_or_else(String::new, |log| format!("\nlog: {log}"));
+    format!("Intrados {}\n{}{log}", env!("CARGO_PKG_VERSION"), banner.details)
+}
+
 /// Draws them.
 pub(crate) fn show(ui: &mut Ui, world: &mut World) {
     let all = world.resource::<Banners>().0.clone();
+    let log = world.resource::<Log>().file().map(|file| file.display().to_string());
     let mut asked = Vec::new();
     for (n, banner) in all.iter().enumerate() {
         Side::top(egui::Id::unique(("banner", n))).show(ui, |ui| {
@@ -119,12 +126,12 @@ pub(crate) fn show(ui: &mut Ui, world: &mut World) {
                 {
                     asked.push(Action::Reload);
                 }
-                if ui.button(tr!("Copy details")).clicked() {
-                    ui.ctx().copy_text(format!(
-                        "Intrados {}\n{}",
-                        env!("CARGO_PKG_VERSION"),
-                        banner.details
-                    ));
+                let mut copy = ui.button(tr!("Copy details"));
+                if let Some(log) = &log {
+                    copy = copy.on_hover_text(tr!("The log is kept in {}", log));
+                }
+                if copy.clicked() {
+                    ui.ctx().copy_text(details(banner, log.as_deref()));
                 }
                 if ui.button(tr!("Dismiss")).clicked() {
                     world.resource_mut::<Banners>().0.retain(|b| b != banner);

@@ -7,7 +7,7 @@ use intrados_light::View;
 use intrados_scene::plugin::CurrentScene;
 
 use crate::{
-    Action, Actions, Jump, Language, Lengths, Look, Quantity, Workspace,
+    Action, Actions, Aspect, Jump, Language, Lengths, Look, Quantity, Workspace,
     lang::{self, term},
     layout::Layout,
     place::Panels,
@@ -107,7 +107,7 @@ fn fixed(look: &Look) -> Vec<Command> {
         command(tr!("undo"), "Ctrl+Z", by(CTRL, Key::Z), Action::Undo),
         command("", "", by(CTRL, Key::Y), Action::Redo),
         command(tr!("list all commands"), "Ctrl+P  Ctrl+K", by(CTRL, Key::P), Action::Palette),
-        command(tr!("list of keys"), "F1  ?", by(NONE, Key::F1), Action::Keys),
+        command(tr!("list of keys"), "F1  ?  H", by(NONE, Key::F1), Action::Keys),
         command(
             tr!("inspector's or expert's layout"),
             "F9",
@@ -139,6 +139,18 @@ fn fixed(look: &Look) -> Vec<Command> {
             by(NONE, Key::Home),
             Action::Home,
         ),
+        // Their keys are those of estimators; which is meant, what is seen tells.
+        command(tr!("the structure from the front"), "1", None, Action::LookFrom(Aspect::Front)),
+        command(tr!("the structure from the side"), "3", None, Action::LookFrom(Aspect::Side)),
+        command(
+            tr!("the structure from above"),
+            "7",
+            by(NONE, Key::Num7),
+            Action::LookFrom(Aspect::Top),
+        ),
+        command(tr!("hide or show the legend"), "L", by(NONE, Key::L), Action::Legend),
+        command(tr!("CT slice before"), "[", by(NONE, Key::OpenBracket), Action::StepSlice(false)),
+        command(tr!("next CT slice"), "]", by(NONE, Key::CloseBracket), Action::StepSlice(true)),
         command(tr!("keep this view"), "", None, Action::KeepView(String::new())),
         command(tr!("list of views, to name and to forget them"), "", None, Action::Views),
         command(tr!("fly along the selected member, or halt"), "", None, Action::Fly),
@@ -170,6 +182,7 @@ fn fixed(look: &Look) -> Vec<Command> {
         command(tr!("quit"), "Ctrl+Q", by(CTRL, Key::Q), Action::Quit),
         command("", "", by(CTRL, Key::K), Action::Palette),
         command("", "", by(NONE, Key::Questionmark), Action::Keys),
+        command("", "", by(NONE, Key::H), Action::Keys),
         command("", "", by(shifted, Key::P), Action::Palette),
     ]
 }
@@ -231,6 +244,8 @@ pub(crate) fn keys(ui: &Ui, world: &mut World) {
     let is_typing = ui.ctx().text_edit_focused();
     // A button that has the focus is pressed by it.
     let has_focus = ui.ctx().memory(|m| m.focused().is_some());
+    // A menu that is open is put away by it, and nothing else is.
+    let has_menu = egui::Popup::is_any_open(ui.ctx());
     let commands = fixed(world.resource::<Look>());
     let acts_anywhere = |modifiers: Modifiers, key: Key| {
         modifiers.command && !matches!(key, Key::Z | Key::Y | Key::Home | Key::End)
@@ -239,7 +254,8 @@ pub(crate) fn keys(ui: &Ui, world: &mut World) {
     let asked: Vec<Action> = ui.input_mut(|i| {
         let own = commands.into_iter().filter_map(|c| Some((c.shortcut?, c.action)));
         own.filter(|((modifiers, key), _)| {
-            let is_taken = is_typing || has_focus && *key == Key::Space;
+            let is_taken =
+                is_typing || has_focus && *key == Key::Space || has_menu && *key == Key::Escape;
             if is_taken && !acts_anywhere(*modifiers, *key) {
                 return false;
             }
@@ -252,11 +268,16 @@ pub(crate) fn keys(ui: &Ui, world: &mut World) {
         .map(|(_, action)| action)
         .collect()
     });
+    let desk = world.resource::<Desk>();
+    let [light, structure] = ["Render", "Structure"].map(|panel| desk.has_drawn(panel));
+    // Digits are sides of the structure where it is seen, unless the picture of light is, too.
+    let turns = structure && !light;
     // What pauses the picture of light halts a flight that is seen.
-    let flies = world.resource::<Structure>().is_flying()
-        && world.resource::<Desk>().has_drawn("Structure");
+    let flies = world.resource::<Structure>().is_flying() && structure;
     let meant = |action: Action| match action {
         Action::Pause if flies => Action::Fly,
+        Action::Show(View::Primal) if turns => Action::LookFrom(Aspect::Front),
+        Action::Show(View::Combined) if turns => Action::LookFrom(Aspect::Side),
         action => action,
     };
     let mut actions = world.resource_mut::<Actions>();
@@ -279,7 +300,9 @@ pub(crate) fn sheet(ui: &Ui, world: &mut World) {
         .anchor(egui::Align2::CENTER_CENTER, [0.0, 0.0])
         .open(&mut open)
         .show(ui.ctx(), |ui| {
-            ScrollArea::vertical().max_height(height).show(ui, |ui| {
+            // As high as the window lets it be: egui's own windows begin with half of that.
+            let area = ScrollArea::vertical().max_height(height).min_scrolled_height(height);
+            area.show(ui, |ui| {
                 egui::Grid::new("keys").num_columns(2).striped(true).show(ui, |ui| {
                     for (keys, what) in &rows {
                         ui.strong(keys);

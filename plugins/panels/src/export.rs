@@ -15,12 +15,13 @@ use intrados_stage::{
 };
 
 use crate::{
-    Action, Actions, Log, Look, Quantity,
+    Action, Actions, Banners, Log, Look, Quantity,
     fields::{self, Fields, Painted},
-    lang::{fixed, local, term},
+    lang::{local, term},
     legend::{Legend, put_under},
-    number::significant,
+    number::{count, plus_minus, significant},
     picture,
+    toast::Toasts,
 };
 
 /// Writes a film to a file, or says why it cannot.
@@ -35,7 +36,13 @@ pub struct Exporter(pub Arc<Write>);
 pub(crate) struct Export {
     pub(crate) shown: bool,
     pub(crate) path: String,
-    task: Option<Task<Result<String, String>>>,
+    task: Option<Task<Result<Written, String>>>,
+}
+
+/// Where a picture was written, and what it shows.
+struct Written {
+    path: String,
+    what: String,
 }
 
 impl Export {
@@ -87,10 +94,10 @@ pub(crate) fn sheet(
         ("exr", _, None) => Some(tr!("This build writes no EXR; use `intrados render`.")),
         _ => Some(tr!("The name must end in .png or .exr.")),
     };
+    let is_writing = export.task.is_some().then(|| tr!("Another file is being written."));
+    let problem = problem.or(is_writing);
     ui.horizontal(|ui| {
-        if ui
-            .add_enabled(problem.is_none() && export.task.is_none(), egui::Button::new(tr!("Save")))
-            .clicked()
+        if ui.add_enabled(problem.is_none(), egui::Button::new(tr!("Save"))).clicked()
             && let Some(render) = render
         {
             export.shown = false;
@@ -118,14 +125,14 @@ fn save(
     fields: &Fields,
     exporter: Option<&Exporter>,
     path: PathBuf,
-) -> Task<Result<String, String>> {
+) -> Task<Result<Written, String>> {
     let label = tr!("writing {}", path.display());
     match exporter.cloned() {
         Some(exporter) => {
             let render = render.clone();
             Task::spawn(jobs, label, move |_| {
-                let written = (exporter.0)(&render, &path);
-                written.map(|()| path.display().to_string()).map_err(|e| e.to_string())
+                (exporter.0)(&render, &path).map_err(|e| e.to_string())?;
+                Ok(Written { path: path.display().to_string(), what: String::new() })
             })
         }
         None => {
@@ -142,17 +149,14 @@ fn save(
             };
             let image = painted.map_or_else(film, |painted| painted.image.clone());
             let legend = legend(look, painted).map(|legend| legend.drawn(ui, image.width()));
-            let done = format!(
-                "{}: {}",
-                path.display(),
-                describe(render, look, painted.map(|painted| painted.scale.range))
-            );
+            let what = describe(render, look, painted.map(|painted| painted.scale.range));
             Task::spawn(jobs, label, move |_| {
                 let image = match &legend {
                     Some(legend) => put_under(&image, legend),
                     None => image,
                 };
-                write_png(&image, &path).map(|()| done).map_err(|e| e.to_string())
+                write_png(&image, &path, &what).map_err(|e| e.to_string())?;
+                Ok(Written { path: path.display().to_string(), what })
             })
         }
     }
@@ -201,36 +205,63 @@ fn describe(render: &Render, look: &Look, range: Option<[f32; 2]>) -> String {
         }
     };
     let order = look.order.map_or_else(|| tr!("all bounces"), |order| tr!("bounce {}", order));
+    let mean = render.summary().combined;
     tr!(
-        "{}: {}, {}, {} view; {} samples a pixel; scene hash {}; Intrados {}",
+        "{}: {}, {}, {} view; {} samples a pixel, seed {}, mean of the picture {}; scene hash {}; Intrados {}",
         scene.name,
         what,
         order,
         term(&format!("{:?}", look.view)),
-        fixed(render.samples_per_pixel(), 0),
+        count(render.samples_per_pixel()),
+        render.exposures().iter().flatten().next().map_or(0, |exposure| exposure.seed),
+        plus_minus(mean.mean, mean.std_error, "W/(m² sr)"),
         scene.hash,
         env!("CARGO_PKG_VERSION")
     )
 }
 
+/// Writes a picture, and in it by what it was made and `what` it shows: a picture that is sent on
+/// has no other page to say so.
 pub(crate) fn write_png(
     pixels: &ColorImage,
     path: &Path,
-) -> Result<(), Box<dyn std::error::Error>> {
+    what: &str,
+) -> Result<(), Box<dyn Error>> {
     let rgb: Vec<u8> = pixels.pixels.iter().flat_map(|c| [c.r(), c.g(), c.b()]).collect();
     let (w, h) = (u32::try_from(pixels.width())?, u32::try_from(pixels.height())?);
     let mut file = Unfinished::begin(path)?;
-    let png = image::codecs::png::PngEncoder::new(&mut file);
-    image::ImageEncoder::write_image(png, &rgb, w, h, image::ExtendedColorType::Rgb8)?;
+    let mut encoder = png::Encoder::new(&mut file, w, h);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
+    let by = concat!("Intrados ", env!("CARGO_PKG_VERSION"));
+    encoder.add_itxt_chunk("Software".into(), by.into())?;
+    encoder.add_itxt_chunk("Description".into(), what.into())?;
+    let mut writer = encoder.write_header()?;
+    writer.write_image_data(&rgb)?;
+    writer.finish()?;
     Ok(file.finish()?)
 }
 
-/// Says how a write ended.
-pub(crate) fn take(mut export: ResMut<Export>, mut log: ResMut<Log>) {
+/// Says how a write ended: what could not be written must not be overlooked.
+pub(crate) fn take(
+    mut export: ResMut<Export>,
+    mut banners: ResMut<Banners>,
+    mut toasts: ResMut<Toasts>,
+    mut log: ResMut<Log>,
+) {
     let Some(done) = Task::take(&mut export.task) else { return };
     match done {
-        Ok(Ok(what)) => log.say(tr!("wrote {}", what)),
-        Ok(Err(error)) => log.say(tr!("the picture was not written: {}", term(&error.to_string()))),
+        Ok(Ok(Written { path, what })) => {
+            let separator = if what.is_empty() { "" } else { ": " };
+            log.say(tr!("wrote {}", format!("{path}{separator}{what}")));
+            toasts.say(tr!("Saved {}", path));
+        }
+        Ok(Err(why)) => {
+            log.say(tr!("the picture was not written: {}", term(&why)));
+            banners.cannot(&tr!("Not saved"), &why);
+        }
+        // What a panic said is told with all others.
         Err(_) => log.say(tr!("the picture was not written: the writer broke off")),
     }
 }

@@ -11,7 +11,7 @@ use crate::{
     fields::{self, Fields},
     lang::{fixed, term},
     lengths,
-    number::{percent, plus_minus, significant},
+    number::{count, percent, plus_minus, significant},
     picture::{self, Cursor, Under, relative_error},
 };
 
@@ -75,6 +75,9 @@ fn under_cursor(
             }
             ui.weak(tr!("Relative error"));
             ui.label(percent(f64::from(relative_error(mean, variance))));
+            ui.end_row();
+            ui.weak(tr!("Samples a pixel"));
+            ui.label(count(render.samples_per_pixel()));
             ui.end_row();
         }
         for (side, name) in

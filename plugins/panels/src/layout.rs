@@ -123,8 +123,11 @@ pub(crate) fn greet(
     let same = Some(&scene.path).filter(|path| path.exists() && **path == open.path);
     let member = selection.0.filter(|_| same.is_some()).and_then(|i| open.members.get(i));
     selection.0 = member.and_then(|id| scene.members.iter().position(|m| m.id == *id));
-    if same.is_none() && desk.shown() == Workspace::Inspector {
-        desk.open("Structure");
+    // Whatever tab was in front of the last scene: of one without members there is light to see.
+    match same {
+        None if scene.members.is_empty() => desk.light(),
+        None if desk.shown() == Workspace::Inspector => desk.open("Structure"),
+        _ => {}
     }
     *open = Open {
         path: scene.path.clone(),
@@ -344,7 +347,7 @@ fn menu(ui: &mut Ui, world: &mut World) {
         if ui.button(tr!("Commands")).on_hover_text("Ctrl+P").clicked() {
             asked.push(Action::Palette);
         }
-        if ui.button(tr!("Keys")).on_hover_text(tr!("F1 or ?")).clicked() {
+        if ui.button(tr!("Keys")).on_hover_text(tr!("F1, ? or H")).clicked() {
             asked.push(Action::Keys);
         }
         if let Some(scene) = scene {

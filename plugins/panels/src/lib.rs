@@ -80,6 +80,7 @@ pub use refine::Refine;
 pub use saving::Taken;
 pub use scale::Colours;
 pub use statistics::Statistics;
+pub use structure::Aspect;
 pub use viewpoint::Viewpoint;
 pub use window::Window;
 pub use workspace::Workspace;

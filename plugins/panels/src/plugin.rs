@@ -28,6 +28,8 @@ pub struct PanelsPlugin {
     /// Where it is kept what is open and saved nowhere, for the case that the program breaks off;
     /// `None`: nowhere.
     pub session: Option<PathBuf>,
+    /// Where the lines of the log are kept; `None`: nowhere.
+    pub log: Option<PathBuf>,
     /// Where views are kept by name; `None`: nowhere, they last as long as the window.
     pub views: Option<PathBuf>,
     /// Whether the system's file dialogs may be opened.
@@ -43,10 +45,10 @@ impl PanelsPlugin {
     pub fn desktop() -> Self {
         let file = |name| dirs::data_dir().map(|d| d.join("intrados").join(name));
         let [recent, layout] = ["recent.json", "layout.json"].map(file);
-        let [session, views] = ["session.json", "views.json"].map(file);
+        let [session, views, log] = ["session.json", "views.json", "log.txt"].map(file);
         let language = sys_locale::get_locale().map_or(Language::English, |tag| Language::of(&tag));
         let slice = Some(Duration::from_millis(8));
-        Self { slice, recent, layout, session, views, dialogs: true, language }
+        Self { slice, recent, layout, session, log, views, dialogs: true, language }
     }
 }
 
@@ -54,6 +56,9 @@ impl Plugin for PanelsPlugin {
     fn build(&self, app: &mut App) {
         let desk = workspace::Desk::read(self.layout.clone());
         let (colours, ranges) = desk.scales();
+        let session = session::Session::read(self.session.clone());
+        // A second window leaves both to the first.
+        let log = self.log.clone().filter(|_| session.is_kept());
         app.init_resource::<Panels>()
             .init_resource::<Actions>()
             .init_resource::<Selection>()
@@ -67,7 +72,7 @@ impl Plugin for PanelsPlugin {
             .init_resource::<moment::Moment>()
             .init_resource::<moment::Courses>()
             .init_resource::<play::Play>()
-            .init_resource::<Log>()
+            .insert_resource(Log::kept(log))
             .init_resource::<picture::Picture>()
             .init_resource::<picture::Cursor>()
             .init_resource::<smooth::Smoothed>()
@@ -97,7 +102,7 @@ impl Plugin for PanelsPlugin {
             .insert_resource(desk)
             .insert_resource(intrados_light::plugin::Widening(stress::WIDENING))
             .insert_resource(Refine::new(self.slice))
-            .insert_resource(session::Session::read(self.session.clone()))
+            .insert_resource(session)
             .insert_resource(recent::Recent::read(self.recent.clone()))
             .insert_resource(views::Views::read(self.views.clone()))
             .add_systems(
@@ -126,6 +131,7 @@ impl Plugin for PanelsPlugin {
                     saving::take,
                     session::keep,
                     banner::gather,
+                    log::keep,
                 )
                     .chain()
                     .in_set(Stage::Present),

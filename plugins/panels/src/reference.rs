@@ -317,7 +317,7 @@ impl Reference {
         if !self.is_kept() {
             return false;
         }
-        let row = ui.horizontal(|ui| {
+        let row = ui.horizontal_wrapped(|ui| {
             let hint = tr!(
                 "The reference on the left of a line that is dragged, the picture on its right"
             );

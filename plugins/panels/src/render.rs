@@ -27,6 +27,8 @@ use crate::{
 
 /// Radians per point dragged.
 const TURN: f32 = 0.008;
+/// Half the width of a normal 95 % interval, in standard errors.
+const HALF_WIDTH: f64 = 1.96;
 
 pub(crate) fn render(
     InMut(ui): InMut<Ui>,
@@ -136,7 +138,11 @@ pub(crate) fn render(
         asked.into_iter().for_each(|action| actions.ask(action));
     }
     match look.quantity {
-        Quantity::Radiance => reference.figures(ui, below, &look),
+        // They may be wider than the picture.
+        Quantity::Radiance => {
+            let wide = below.with_min_x(area.left()).with_max_x(area.right());
+            reference.figures(ui, wide, &look);
+        }
         Quantity::Error => {
             let (scale, caption) = (picture::error_scale(&look), picture::error_caption());
             scale::legend(ui, below, &scale, picture::error_share, &caption);
@@ -232,6 +238,7 @@ fn hand(
     }
 }
 
+/// Rows that wrap: in a narrow panel what is at their ends would be out of reach.
 fn toolbar(
     ui: &mut Ui,
     look: &mut Look,
@@ -240,7 +247,7 @@ fn toolbar(
     may_keep: bool,
     actions: &mut Actions,
 ) {
-    ui.horizontal(|ui| {
+    ui.horizontal_wrapped(|ui| {
         let pause = if refine.paused { tr!("▶ Continue") } else { tr!("⏸ Pause") };
         if ui.button(pause).on_hover_text("Space").clicked() {
             actions.ask(Action::Pause);
@@ -264,7 +271,7 @@ fn toolbar(
         ui.selectable_value(&mut look.quantity, Quantity::Error, tr!("Error"))
             .on_hover_text(tr!("Relative standard error of every pixel (E)"));
     });
-    ui.horizontal(|ui| {
+    ui.horizontal_wrapped(|ui| {
         let label = ui.label(tr!("Exposure|photo"));
         let slider = slide(&mut look.exposure, -10.0..=10.0).suffix(" EV").fixed_decimals(1);
         ui.add(slider)
@@ -296,7 +303,7 @@ fn steered(
     fields: &Fields,
     ranges: &mut Ranges,
 ) {
-    ui.horizontal(|ui| {
+    ui.horizontal_wrapped(|ui| {
         steering::choice(ui, learning);
         ui.separator();
         field_choice(ui, look);
@@ -360,7 +367,7 @@ fn status(
         ui.horizontal(|ui| ui.weak(" "));
         return;
     };
-    ui.horizontal(|ui| {
+    ui.horizontal_wrapped(|ui| {
         let there = refine.is_there(statistics);
         ui.strong(match () {
             () if refine.paused => tr!("⏸ Paused"),
@@ -386,13 +393,14 @@ fn status(
         let work = fixed(now.cpu_seconds, 1);
         ui.label(format!("{}, {work} CPU-s", duration(refine.seconds)));
     });
-    ui.horizontal(|ui| {
+    ui.horizontal_wrapped(|ui| {
         if let Some(reading) = now.reading(look.view) {
             let mean = plus_minus(reading.mean, reading.std_error, "W/(m² sr)");
             ui.label(tr!("Mean {}", mean)).on_hover_text(tr!("Mean luminance of the picture"));
             if reading.rel_error().is_finite() {
-                ui.label(format!("({})", percent(reading.rel_error()))).on_hover_text(tr!(
-                    "Relative standard error of the mean. A single pixel's is about {}.",
+                let [error, half] = [1.0, HALF_WIDTH].map(|k| percent(k * reading.rel_error()));
+                ui.label(tr!("({}; 95 %: ± {})", error, half)).on_hover_text(tr!(
+                    "Relative standard error of the mean, and half the width of its 95 % interval. A single pixel's error is about {}.",
                     percent(now.pixel_noise())
                 ));
             }

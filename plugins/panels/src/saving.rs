@@ -4,6 +4,7 @@ use std::{
     io::Write,
     path::{Path, PathBuf},
     sync::{Arc, Mutex, PoisonError, mpsc},
+    time::{Duration, Instant},
 };
 
 use bevy_ecs::prelude::*;
@@ -19,6 +20,9 @@ use intrados_stage::{
 use crate::{
     Action, Actions, Banners, Latest, Log, export::write_png, lang::term, report, toast::Toasts,
 };
+
+/// So long tools are put away for a picture: where the system gives none, they come back.
+const AWAY: Duration = Duration::from_secs(2);
 
 /// What can be saved.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -45,10 +49,13 @@ pub(crate) struct Saving {
     shown: Option<Taken>,
     path: String,
     with_pdf: bool,
-    task: Option<Task<Result<Written, String>>>,
+    /// None: somebody cancelled it.
+    task: Option<Task<Result<Option<Written>, String>>>,
     /// A picture that is to be taken of the window, once it is drawn; without a file for the
     /// clipboard.
     wanted: Option<(Option<PathBuf>, Option<Rect>)>,
+    /// Since when a picture is wanted.
+    since: Option<Instant>,
     /// Where it comes, once it was asked for.
     coming: Option<Mutex<mpsc::Receiver<Arc<ColorImage>>>>,
 }
@@ -91,7 +98,13 @@ impl Saving {
     /// Takes a picture of the window, or of what is at a place in it, in the next frame, for a file
     /// or for the clipboard.
     pub(crate) fn take_picture(&mut self, path: Option<PathBuf>, of: Option<Rect>) {
-        self.wanted = Some((path, of));
+        (self.wanted, self.since) = (Some((path, of)), Some(Instant::now()));
+    }
+
+    /// Whether a picture of a panel is being taken: its tools are not of it.
+    pub(crate) fn takes_panel(&self) -> bool {
+        self.wanted.as_ref().is_some_and(|(_, of)| of.is_some())
+            && self.since.is_some_and(|since| since.elapsed() < AWAY)
     }
 }
 
@@ -178,12 +191,13 @@ pub(crate) fn sheet(
         Some(tr!("It needs a name."))
     } else if needs && result.is_none() {
         Some(tr!("The prediction is not done yet."))
+    } else if saving.task.is_some() {
+        Some(tr!("Another file is being written."))
     } else {
         None
     };
     ui.horizontal(|ui| {
-        let may = why_not.is_none() && saving.task.is_none();
-        if ui.add_enabled(may, Button::new(tr!("Save"))).clicked() {
+        if ui.add_enabled(why_not.is_none(), Button::new(tr!("Save"))).clicked() {
             let path = PathBuf::from(saving.path.trim());
             match (what, result) {
                 (Taken::Picture(panel), _) => actions.ask(Action::TakePicture(path, panel)),
@@ -225,12 +239,12 @@ fn table(
     path: PathBuf,
     make: impl FnOnce() -> String + Send + 'static,
     jobs: &mut Jobs,
-) -> Task<Result<Written, String>> {
+) -> Task<Result<Option<Written>, String>> {
     Task::spawn(jobs, tr!("writing {}", path.display()), move |_| {
         let text = make();
         let written = file::put(&path, |out| out.write_all(text.as_bytes()));
         written.map_err(|e| format!("{}: {e}", path.display()))?;
-        Ok(Written { files: None, path })
+        Ok(Some(Written { files: None, path }))
     })
 }
 
@@ -262,8 +276,9 @@ pub(crate) fn picture(ui: &Ui, world: &mut World) {
         };
         match path {
             Some(path) => {
+                let what = described(world);
                 let mut jobs = world.resource_mut::<Jobs>();
-                saving.task = Some(write_picture(&mut jobs, part, path));
+                saving.task = Some(write_picture(&mut jobs, part, path, what));
             }
             None => {
                 ui.ctx().copy_image(part);
@@ -275,14 +290,23 @@ pub(crate) fn picture(ui: &Ui, world: &mut World) {
     *world.resource_mut::<Saving>() = saving;
 }
 
+/// What a picture of the window is of.
+fn described(world: &World) -> String {
+    world.get_resource::<CurrentScene>().map_or_else(String::new, |scene| {
+        let (name, hash) = (&scene.0.name, &scene.0.hash);
+        tr!("{}; scene hash {}; Intrados {}", name, hash, env!("CARGO_PKG_VERSION"))
+    })
+}
+
 fn write_picture(
     jobs: &mut Jobs,
     picture: ColorImage,
     path: PathBuf,
-) -> Task<Result<Written, String>> {
+    what: String,
+) -> Task<Result<Option<Written>, String>> {
     Task::spawn(jobs, tr!("writing {}", path.display()), move |_| {
-        write_png(&picture, &path).map_err(|e| format!("{}: {e}", path.display()))?;
-        Ok(Written { files: None, path })
+        write_png(&picture, &path, &what).map_err(|e| format!("{}: {e}", path.display()))?;
+        Ok(Some(Written { files: None, path }))
     })
 }
 
@@ -305,7 +329,8 @@ pub(crate) fn take(
 ) {
     let Some(done) = Task::take(&mut saving.bypass_change_detection().task) else { return };
     match done {
-        Ok(Ok(Written { files, path })) => {
+        Ok(Ok(None)) => log.say(tr!("saving was cancelled")),
+        Ok(Ok(Some(Written { files, path }))) => {
             let path = path.display();
             let what = files.map_or_else(|| path.to_string(), |n| tr!("{} files into {}", n, path));
             toasts.say(tr!("Saved {}", what));

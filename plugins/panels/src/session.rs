@@ -74,6 +74,11 @@ impl Session {
         session
     }
 
+    /// Whether this window keeps it: of several, one does.
+    pub(crate) fn is_kept(&self) -> bool {
+        self.lock.is_some()
+    }
+
     /// Keeps what is open now, where that is another thing than before.
     fn keep(&mut self, now: Kept) {
         let is_soon = self.last.is_some_and(|last| last.elapsed() < EVERY);

@@ -292,6 +292,12 @@ impl Desk {
         self.shown = if has_members { self.chosen } else { Workspace::Expert };
     }
 
+    /// Shows the picture of light, where it lies.
+    pub(crate) fn light(&mut self) {
+        self.shown = Workspace::Expert;
+        self.open("Render");
+    }
+
     /// Light or dark, from now on.
     pub(crate) fn dress(&mut self, theme: egui::ThemePreference) {
         (self.theme, self.is_dressed, self.is_changed) = (theme, false, true);

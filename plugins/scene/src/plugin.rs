@@ -12,7 +12,7 @@ use intrados_stage::{Access, Job, Jobs, Stage, Task};
 
 use crate::{
     LoadError, Scene,
-    import::{ImportError, Told, import},
+    import::{ImportError, Imported, Told, import},
 };
 
 /// Asks for a scene: a file, or a bundled scene by its name. The scene that is there stays until
@@ -126,16 +126,33 @@ fn imported(path: &Path, access: &Access, job: &Job) -> Result<Scene, LoadError>
     let told = Told::default();
     for folder in [beside, aside] {
         let scene = folder.join("scene.ron");
+        let mut remarks = Vec::new();
         if !scene.exists() {
             match import(path, &folder, &told, access, &job.part(0.0, 0.9)) {
                 Err(ImportError::CannotWrite(_)) => continue,
-                other => drop(other?),
+                other => remarks = remarks_on(&other?, &folder),
             }
         }
-        return Scene::load_within(&scene, access, &job.part(0.9, 1.0));
+        let mut scene = Scene::load_within(&scene, access, &job.part(0.9, 1.0))?;
+        scene.warnings.extend(remarks);
+        return Ok(scene);
     }
     let message = "its folder cannot be written: copy it elsewhere, or use `intrados import --out`";
     Err(LoadError::bad(path.display().to_string(), "CANNOT_WRITE", message))
+}
+
+/// What somebody should know of an import who has not read the page that it wrote.
+fn remarks_on(imported: &Imported, folder: &Path) -> Vec<String> {
+    let left: Vec<String> =
+        imported.scenery.iter().map(|(class, count)| format!("{count} {class}")).collect();
+    let left = if left.is_empty() { "none".into() } else { left.join(", ") };
+    let page = folder.join("README.md");
+    let whole = format!(
+        "imported from {}; no members, and shown as they are: {left}; what was assumed is said in {}",
+        imported.format,
+        page.display()
+    );
+    std::iter::once(whole).chain(imported.notes.iter().cloned()).collect()
 }
 
 fn finish_loading(world: &mut World) {

@@ -225,6 +225,8 @@ fn a_glb_and_a_folder_of_slices_become_a_report() {
     journey.until("making a project", |w| {
         w.with(|w| w.resource::<CurrentScene>().0.path.ends_with("portal.intrados/scene.ron"))
     });
+    let warnings = journey.window.with(|w| w.resource::<CurrentScene>().0.warnings.clone());
+    assert!(warnings.iter().any(|line| line.contains("README.md")), "{warnings:?}");
     journey.window.harness.key_press(Key::Escape);
     journey.window.frames(3);
     let members = journey.window.with(|w| w.resource::<CurrentScene>().0.members.clone());

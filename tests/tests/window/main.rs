@@ -301,6 +301,23 @@ fn a_click_in_the_tree_selects_a_member() {
     assert_eq!(window.with(|w| *w.resource::<Selection>()), Selection(None));
 }
 
+/// Escape in a menu puts the menu away, and only the next one what lies below.
+#[test]
+fn escape_in_a_menu_leaves_the_selection() {
+    let mut window = with_column();
+    window.ask(Action::Select(Some(0)));
+    window.frames(2);
+    window.click("View");
+    assert!(window.harness.query_by_label("Light theme").is_some(), "the menu is not open");
+    window.harness.key_press(Key::Escape);
+    window.frames(3);
+    assert!(window.harness.query_by_label("Light theme").is_none(), "the menu is still open");
+    assert_eq!(window.with(|w| *w.resource::<Selection>()), Selection(Some(0)));
+    window.harness.key_press(Key::Escape);
+    window.frames(2);
+    assert_eq!(window.with(|w| *w.resource::<Selection>()), Selection(None));
+}
+
 #[test]
 fn a_bad_file_shows_a_banner_that_can_be_dismissed_and_the_old_scene_stays() {
     let mut window = Window::with_scene("cornell");
@@ -342,6 +359,51 @@ fn a_foreign_panel_appears_in_its_place() {
     assert!(window.harness.query_by_label("2.5 mGy").is_some());
     window.click("Dose map");
     assert_eq!(window.harness.query_all_by_label("2.5 mGy").count(), 2);
+}
+
+/// Of a scene without members the picture of light is in front, whatever was before; an inspector
+/// has a button that goes there, and structures open in the layout that was chosen.
+#[test]
+fn a_scene_without_members_shows_its_light() {
+    let mut window = Window::with_scene("cornell");
+    let draws = |window: &Window| window.harness.query_by_label("⏸ Pause").is_some();
+    window.click("Structure");
+    assert!(!draws(&window));
+    window.ask(Action::Open("slit".into()));
+    window.until("slit", |w| w.resource::<CurrentScene>().0.name == "slit");
+    window.frames(3);
+    assert!(draws(&window), "it opened on a picture with nothing in it");
+    window.ask(Action::Arrange(Workspace::Inspector));
+    window.frames(3);
+    // In the picture, and in the sheet.
+    assert_eq!(window.harness.query_all_by_label("Look at its light").count(), 2);
+    window.harness.query_all_by_label("Look at its light").next().expect("a way").click();
+    window.frames(3);
+    assert!(draws(&window));
+    window.ask(Action::Open("column".into()));
+    window.until("column", |w| w.resource::<CurrentScene>().0.name == "column");
+    window.frames(3);
+    assert!(window.harness.query_by_label("Damage of members").is_some());
+}
+
+/// In a small window rows of tools wrap: what is at their ends stays in reach.
+#[test]
+fn a_small_window_has_all_tools_of_its_pictures() {
+    let mut window = Window::with_scene("column");
+    window.harness.set_size(egui::vec2(900.0, 600.0));
+    window.frames(6);
+    let ends = |window: &Window, tools: &[&str], beside: &str| {
+        let edge = window.harness.get_by_label(beside).rect().left();
+        for tool in tools {
+            let rect = window.harness.get_by_label(tool).rect();
+            assert!(rect.right() <= edge, "{tool} ends at {rect}, {beside} begins at {edge}");
+        }
+    };
+    ends(&window, &["Light", "Keep as reference", "Smoothed preview"], "Inspector");
+    window.ask(Action::Arrange(Workspace::Inspector));
+    window.ask(Action::Tab("Structure"));
+    window.frames(6);
+    ends(&window, &["Names", "Compare", "As it looks"], "Members");
 }
 
 #[test]
@@ -874,6 +936,27 @@ fn the_picture_is_written_as_png() {
     let folder = tempfile::tempdir().expect("a folder for the picture");
     let file = folder.path().join("view.png");
     export(&mut window, &file);
+    // And says what it shows, by what it was made, and of which scene.
+    let hash = window.with(|w| w.resource::<CurrentScene>().0.hash.clone());
+    let written = std::fs::read(&file).expect("a picture");
+    for said in ["Software", "Intrados ", "samples a pixel, seed ", hash.as_str()] {
+        let bytes = said.as_bytes();
+        assert!(written.windows(bytes.len()).any(|w| w == bytes), "it does not say {said:?}");
+    }
+}
+
+/// What cannot be written is said where nobody overlooks it.
+#[test]
+fn a_picture_that_cannot_be_written_has_a_banner() {
+    let mut window = Window::with_scene("cornell");
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("no_folder");
+    std::fs::write(&file, "").expect("written");
+    window.ask(Action::Export);
+    window.frames(3);
+    type_into(&mut window, "File name", &file.join("view.png").display().to_string());
+    window.click("Save");
+    window.until_seen("⚠ Not saved:");
 }
 
 /// Opens the Stress tab for member `index` with elements of `element` metres.

@@ -9,7 +9,9 @@ use glam::Vec3;
 use intrados_forecast::ForecastSettings;
 use intrados_light::Render;
 use intrados_mechanics::plugin::{Analyses, ShownAt};
-use intrados_panels::{Action, Latest, Lengths, Log, PanelsPlugin, Refine, Selection, Viewpoint};
+use intrados_panels::{
+    Action, Latest, Lengths, Log, Look, PanelsPlugin, Refine, Selection, Viewpoint, Workspace,
+};
 use intrados_predict::{PredictSettings, Predicting};
 use intrados_scene::{Camera, plugin::CurrentScene};
 use intrados_stage::Work;
@@ -76,6 +78,59 @@ fn lengths_are_written_in_the_unit_that_was_chosen() {
     assert!((scale * first(&metres) - first(&millimetres)).abs() < 6.0, "{metres} {millimetres}");
     assert!(millimetres.contains(" mm (") && !millimetres.contains(" m "), "{millimetres}");
     assert!(feet.contains(" in (") && !feet.contains(" m"), "{feet}");
+}
+
+/// A picture of the structure that is saved has its legend, and none of the tools that lie over it.
+#[test]
+fn tools_are_put_away_for_a_picture_of_the_structure() {
+    let mut window = with_column();
+    assert!(window.harness.query_by_label("As it looks").is_some());
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("structure.png");
+    window.ask(Action::TakePicture(file, Some("Structure".into())));
+    window.frame();
+    assert!(window.harness.query_by_label("As it looks").is_none());
+    assert!(window.harness.query_by_label("Damage of members").is_some());
+}
+
+/// A digit is a side of the structure, but an estimator where the picture of light is seen; the
+/// legend goes and comes by a key, and so do the slices.
+#[test]
+fn keys_look_from_the_sides_and_go_through_slices() {
+    let mut window = with_column();
+    window.until("a camera", |w| w.resource::<Viewpoint>().camera().is_some());
+    window.frames(2);
+    let looked = |window: &mut Window, key: Key, index: usize| {
+        window.harness.key_press(key);
+        window.frames(3);
+        window.ask(Action::KeepView(String::new()));
+        window.frames(2);
+        let view = view(window, index);
+        (view.target - view.position).normalize()
+    };
+    let [front, side, above] =
+        [(Key::Num1, 0), (Key::Num3, 1), (Key::Num7, 2)].map(|(k, i)| looked(&mut window, k, i));
+    assert!(front.z < -0.9 && side.x < -0.9 && above.y < -0.9, "{front} {side} {above}");
+    window.ask(Action::Select(Some(1)));
+    window.ask(Action::Tab("CT"));
+    window.until_seen("CT slice");
+    for (key, slice) in [(Key::CloseBracket, "slice 2 of"), (Key::OpenBracket, "slice 1 of")] {
+        window.harness.key_press(key);
+        for _ in 0..2_000 {
+            window.frame();
+            if has(&window, slice) {
+                break;
+            }
+            rest();
+        }
+        assert!(has(&window, slice), "{slice}");
+    }
+    window.ask(Action::Arrange(Workspace::Expert));
+    window.ask(Action::Tab("Render"));
+    window.frames(3);
+    window.harness.key_press(Key::Num1);
+    window.frames(2);
+    assert_eq!(window.with(|w| w.resource::<Look>().view), intrados_light::View::Primal);
 }
 
 /// Through a tunnel the camera flies along its axis and halts where it is told to; however it ends,

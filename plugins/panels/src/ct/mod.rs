@@ -100,6 +100,12 @@ impl Ct {
         (self.origin, self.index, self.sinogram) = (Some(Origin::Told), index, false);
     }
 
+    /// Shows the next slice of those that are shown, or the one before.
+    pub(crate) fn step(&mut self, forward: bool) {
+        // The tab keeps it among those that there are.
+        self.index = if forward { self.index + 1 } else { self.index.saturating_sub(1) };
+    }
+
     /// Puts the tool away with what it has drawn; false if there was none.
     pub(crate) fn end_tool(&mut self) -> bool {
         std::mem::take(&mut self.probe).is_on()

@@ -74,20 +74,23 @@ fn begin(
     })
 }
 
-/// The same for whoever asks from elsewhere, with a PDF of it; says what was written.
+/// The same for whoever asks from elsewhere, with a PDF of it; says what was written, or nothing
+/// where somebody cancelled it.
 pub(crate) fn save_report(
     folder: PathBuf,
     scene: Arc<Scene>,
     prediction: Arc<Prediction>,
     with_pdf: bool,
     jobs: &mut Jobs,
-) -> Task<Result<Written, String>> {
+) -> Task<Result<Option<Written>, String>> {
     let command = format!("intrados predict {} --out {}", scene.name, folder.display());
     let record = Record { command, pdf: with_pdf, ..Record::default() };
     Task::spawn(jobs, tr!("writing {}", folder.display()), move |job| {
-        let files = aside(|| write(&record, &folder, scene, &prediction, job))
-            .map_err(|e| e.to_string())?;
-        Ok(Written { files: Some(files), path: folder })
+        match aside(|| write(&record, &folder, scene, &prediction, job)) {
+            Ok(files) => Ok(Some(Written { files: Some(files), path: folder })),
+            Err(RecordError::Cancelled(Cancelled)) => Ok(None),
+            Err(error) => Err(error.to_string()),
+        }
     })
 }
 

@@ -10,6 +10,13 @@ const WORST: usize = 8;
 
 pub(super) fn overview(ui: &mut Ui, scene: &Scene, latest: &Latest, actions: &mut Actions) {
     ui.label(RichText::new(&scene.name).heading().strong());
+    if scene.members.is_empty() {
+        ui.label(tr!("This scene has no structural members."));
+        if ui.button(tr!("Look at its light")).clicked() {
+            actions.ask(Action::Light);
+        }
+        return;
+    }
     ui.weak(match scene.members.len() {
         1 => tr!("one member"),
         count => tr!("{} members", count),

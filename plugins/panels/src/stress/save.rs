@@ -39,7 +39,7 @@ pub(super) fn picture(
     what: &str,
 ) -> Result<String, String> {
     image.pixels.iter_mut().for_each(|p| *p = background.blend(*p));
-    write_png(&put_under(&image, legend), path).map_err(|e| e.to_string())?;
+    write_png(&put_under(&image, legend), path, what).map_err(|e| e.to_string())?;
     Ok(format!("{}: {what}", path.display()))
 }
 

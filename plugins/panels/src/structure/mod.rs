@@ -30,6 +30,7 @@ use crate::{
     lang::fixed,
     moment::{Courses, Moment, Seen, Timeline},
     play::Play,
+    saving::Saving,
 };
 
 /// Where the structure is looked at from.
@@ -43,13 +44,38 @@ pub(crate) enum View {
     Along(Vec3),
 }
 
-/// Sides, by their names.
-fn sides() -> [(String, Vec3); 3] {
-    [
-        (tr!("Front|view"), Vec3::new(0.0, 0.06, 1.0)),
-        (tr!("Side|view"), Vec3::new(1.0, 0.06, 0.0)),
-        (tr!("Top|view"), Vec3::new(0.0, 1.0, 0.02)),
-    ]
+/// A side that a structure is looked at from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Aspect {
+    /// Along z.
+    Front,
+    /// Along x.
+    Side,
+    /// From above.
+    Top,
+}
+
+impl Aspect {
+    /// All of them, each with its key.
+    const ALL: [(Self, &'static str); 3] =
+        [(Self::Front, "1"), (Self::Side, "3"), (Self::Top, "7")];
+
+    fn name(self) -> String {
+        match self {
+            Self::Front => tr!("Front|view"),
+            Self::Side => tr!("Side|view"),
+            Self::Top => tr!("Top|view"),
+        }
+    }
+
+    /// From there to the middle.
+    fn axis(self) -> Vec3 {
+        match self {
+            Self::Front => Vec3::new(0.0, 0.06, 1.0),
+            Self::Side => Vec3::new(1.0, 0.06, 0.0),
+            Self::Top => Vec3::new(0.0, 1.0, 0.02),
+        }
+    }
 }
 
 /// What the panel remembers.
@@ -99,6 +125,15 @@ impl Default for Structure {
 impl Structure {
     pub(crate) fn look(&mut self, view: View) {
         self.wished = Some(view);
+    }
+
+    pub(crate) fn look_from(&mut self, aspect: Aspect) {
+        self.look(View::Along(aspect.axis()));
+    }
+
+    /// Hides the scale of colours, which may lie over a member, or shows it again.
+    pub(crate) fn swap_legend(&mut self) {
+        self.model.swap_legend();
     }
 
     /// Where it is looked at from, once that is known.
@@ -227,6 +262,7 @@ pub(crate) fn structure(
     play: Res<Play>,
     mut light: Light<'_>,
     mut form: ResMut<Form>,
+    saving: Res<Saving>,
     mut jobs: ResMut<Jobs>,
     mut actions: ResMut<Actions>,
 ) {
@@ -269,7 +305,12 @@ pub(crate) fn structure(
     structure.model.slide(selection.0.filter(|_| form.is_open));
     structure.place = structure.place.filter(|_| form.is_open);
     let pointed = structure.model.show(ui, rect, scene, coloured, scale, *selection, section, jobs);
-    let Some(pointed) = pointed else { return };
+    let Some(pointed) = pointed else {
+        if scene.members.is_empty() {
+            to_light(ui, whole, &mut actions);
+        }
+        return;
+    };
     if pointed.response.dragged() {
         structure.flight.iter_mut().for_each(Flight::rest);
     }
@@ -290,6 +331,13 @@ pub(crate) fn structure(
     structure.place.iter().for_each(|at| measure::end(ui, rect, &pointed.camera, *at));
     let shown = Shown { latest: &latest, seen: &seen, when };
     point(structure, scene, &shown, pointed, form.bypass_change_detection(), &mut actions);
+    if saving.takes_panel() {
+        // Of the tools only what the slider says is part of what is seen.
+        if !when.is_now() {
+            time::write(ui, whole, when.years, &courses.timeline);
+        }
+        return;
+    }
     let bar = Rect::from_min_size(whole.min + vec2(8.0, 8.0), vec2(whole.width() - 16.0, 24.0));
     ui.scope_builder(egui::UiBuilder::new().max_rect(bar), |ui| {
         ui.vertical(|ui| {
@@ -303,6 +351,15 @@ pub(crate) fn structure(
             flown(ui, structure, scene, *selection, &mut actions);
         });
     });
+}
+
+/// The way out of a picture with nothing in it.
+fn to_light(ui: &mut Ui, rect: Rect, actions: &mut Actions) {
+    let size = vec2(200.0_f32.min(rect.width()), 24.0);
+    let at = Rect::from_center_size(rect.center() + vec2(0.0, 30.0), size);
+    if ui.put(at, egui::Button::new(tr!("Look at its light"))).clicked() {
+        actions.ask(Action::Light);
+    }
 }
 
 /// The structure as an earlier prediction has it, from the same side.
@@ -327,7 +384,8 @@ fn beside(
         structure.earlier.names(ui, rect, scene, &value, selection, &pointed.camera);
     }
     let font = egui::TextStyle::Body.resolve(ui.style());
-    let at = rect.left_bottom() + vec2(10.0, -28.0);
+    // Above the ruler.
+    let at = rect.left_bottom() + vec2(10.0, -44.0);
     let ink = ui.visuals().strong_text_color();
     ui.painter().with_clip_rect(rect).text(
         at,
@@ -405,7 +463,8 @@ fn tools(
 ) {
     let frame = egui::Frame::popup(ui.style()).inner_margin(4);
     frame.show(ui, |ui| {
-        ui.horizontal(|ui| {
+        // In a narrow panel the tools at the end would be out of reach.
+        ui.horizontal_wrapped(|ui| {
             views(ui, structure, selection, actions);
             ui.toggle_value(&mut structure.names, tr!("Names"))
                 .on_hover_text(tr!("Name and damage of every member, the worst first"));
@@ -430,13 +489,13 @@ fn tools(
     if timeline.range().is_some() {
         let mut when = **moment;
         frame.show(ui, |ui| {
-            ui.horizontal(|ui| time::bar(ui, &mut when, timeline, is_playing, actions))
+            ui.horizontal_wrapped(|ui| time::bar(ui, &mut when, timeline, is_playing, actions))
         });
         moment.set_if_neq(when);
     }
     let bounds = structure.model.bounds();
     if let Some(section) = &mut structure.section {
-        frame.show(ui, |ui| ui.horizontal(|ui| section.tools(ui, bounds)));
+        frame.show(ui, |ui| ui.horizontal_wrapped(|ui| section.tools(ui, bounds)));
     }
     if structure.tape.is_on {
         frame.show(ui, |ui| {
@@ -461,7 +520,7 @@ fn flown(
     let frame = egui::Frame::popup(ui.style()).inner_margin(4);
     let member = selection.0.and_then(|index| scene.members.get(index));
     if let Some(flight) = &mut structure.flight {
-        let ends = frame.show(ui, |ui| ui.horizontal(|ui| flight.tools(ui)).inner).inner;
+        let ends = frame.show(ui, |ui| ui.horizontal_wrapped(|ui| flight.tools(ui)).inner).inner;
         if ends {
             structure.end_flight();
         }
@@ -508,9 +567,9 @@ fn views(ui: &mut Ui, structure: &mut Structure, selection: Selection, actions: 
     if ui.toggle_value(&mut is_parallel, tr!("Parallel")).on_hover_text(hint).changed() {
         structure.model.narrow(is_parallel);
     }
-    for (name, axis) in sides() {
-        if ui.button(name).clicked() {
-            structure.look(View::Along(axis));
+    for (aspect, key) in Aspect::ALL {
+        if ui.button(aspect.name()).on_hover_text(key).clicked() {
+            structure.look_from(aspect);
         }
     }
 }

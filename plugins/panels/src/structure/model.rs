@@ -91,6 +91,8 @@ pub(super) struct Model {
     slides: Option<usize>,
     /// The camera flies by itself: what is drawn is gone in the next frame.
     flies: bool,
+    /// Nobody wants to see the scale of colours.
+    hides_legend: bool,
     /// The fine picture that is being drawn, and what of.
     coming: Option<(Key, Task<Painted>)>,
 }
@@ -219,11 +221,15 @@ impl Model {
         let shown = self.shown.as_ref()?;
         let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
         ui.painter().image(shown.texture.id(), rect, whole, Color32::WHITE);
-        if self.of_what == Of::Now && scale != Scale::NONE {
+        if self.of_what == Of::Now && scale != Scale::NONE && !self.hides_legend {
             legend(ui, rect, scale);
         }
         let under = response.hover_pos().and_then(|at| shown.spot(at));
         Some(Pointed { response, under, camera, slides })
+    }
+
+    pub(super) fn swap_legend(&mut self) {
+        self.hides_legend = !self.hides_legend;
     }
 
     /// The place on a member that is at a point of the window.

@@ -55,25 +55,28 @@ impl Settling {
             ui.ctx().request_repaint();
             return;
         }
+        let ink = ui.visuals().strong_text_color();
+        if light.look.quantity != Quantity::Radiance {
+            return say(ui, rect, ink, tr!("no light: the Render tab shows errors or a field"));
+        }
         if self.asked.as_ref() != Some(&wanted) {
             self.asked = Some(wanted.clone());
             light.viewpoint.go(wanted);
             return;
         }
         // The Render tab may have gone elsewhere since.
-        let is_ours = light.viewpoint.camera() == Some(&wanted);
-        let Some(now) = light.statistics.now().filter(|_| is_ours) else { return };
-        if light.viewpoint.is_preview() || light.look.quantity != Quantity::Radiance {
-            return;
-        }
+        let is_ours = light.viewpoint.camera() == Some(&wanted) && !light.viewpoint.is_preview();
+        let Some(now) = light.statistics.now().filter(|_| is_ours) else {
+            return say(ui, rect, ink, tr!("light is on its way"));
+        };
         let noise = now.pixel_noise();
         let smoothed = light.smoothed.bypass_change_detection().texture(ui.ctx());
         let plain = light.picture.bypass_change_detection().texture(ui.ctx());
         let Some(texture) = smoothed.or(plain.map(TextureHandle::id)) else { return };
         let share = if noise.is_finite() { (SETTLED / noise).min(1.0) } else { 0.0 };
         let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
-        let ink = Color32::from_white_alpha((255.0 * share) as u8);
-        ui.painter().image(texture, rect, whole, ink);
+        let tint = Color32::from_white_alpha((255.0 * share) as u8);
+        ui.painter().image(texture, rect, whole, tint);
         if smoothed.is_some() {
             smooth::mark(ui, rect);
         }
@@ -81,8 +84,14 @@ impl Settling {
             true => tr!("light, a pixel ± {}", percent(noise)),
             false => tr!("light is on its way"),
         };
-        let font = TextStyle::Small.resolve(ui.style());
-        let at = rect.right_bottom() - vec2(10.0, 8.0);
-        ui.painter().text(at, Align2::RIGHT_BOTTOM, said, font, Color32::from_gray(235));
+        // Over whatever light there is.
+        say(ui, rect, Color32::from_gray(235), said);
     }
+}
+
+/// Writes how the light fares into the corner of the picture.
+fn say(ui: &Ui, rect: Rect, ink: Color32, said: String) {
+    let font = TextStyle::Small.resolve(ui.style());
+    let at = rect.right_bottom() - vec2(10.0, 8.0);
+    ui.painter().text(at, Align2::RIGHT_BOTTOM, said, font, ink);
 }

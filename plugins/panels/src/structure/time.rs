@@ -1,7 +1,7 @@
 //! The slider through the life of a structure: its pours, the days on which somebody looked, today,
 //! and the years that were forecast.
 
-use egui::{Button, Response, Shape, Slider, Stroke, Ui, pos2};
+use egui::{Button, Rect, Response, Shape, Slider, Stroke, Ui, pos2, vec2};
 use intrados_stage::time::{DAY, YEAR};
 
 use crate::{
@@ -95,6 +95,13 @@ fn marks(ui: &Ui, slider: &Response, [first, last]: [f64; 2], timeline: &Timelin
     for years in timeline.looks.iter().filter(within) {
         painter.circle_filled(pos2(x(*years), rect.top() + MARK), 0.8 * MARK, ink);
     }
+}
+
+/// Writes when that is into the corner of a picture.
+pub(super) fn write(ui: &Ui, rect: Rect, years: f64, timeline: &Timeline) {
+    let font = egui::TextStyle::Body.resolve(ui.style());
+    let (at, ink) = (rect.left_top() + vec2(14.0, 12.0), ui.visuals().strong_text_color());
+    ui.painter().text(at, egui::Align2::LEFT_TOP, told(years, timeline), font, ink);
 }
 
 /// When that is, in words; with the year where anybody says what day now is.
