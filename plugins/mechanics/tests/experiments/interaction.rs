@@ -91,7 +91,8 @@ fn by_fibres(axial: f64) -> f64 {
     (1..600).filter_map(|k| moment(1e-4 * f64::from(k))).fold(0.0, f64::max)
 }
 
-/// How far the middle has sunk at the highest load, m.
+/// How far the middle has sunk below the pressed end at the highest load, m: the end lies beyond
+/// its support and rises, and the force goes with it.
 #[derive(Default)]
 struct Sag {
     factor: f64,
@@ -108,8 +109,14 @@ impl Observer for Sag {
     ) -> Result<(), Failure> {
         if step.factor > self.factor {
             let nodes = &structure.model.mesh.nodes;
-            let down = (0..nodes.len()).map(|n| -history.x[3 * n + 1]);
-            (self.factor, self.sag) = (step.factor, down.fold(0.0, f64::max));
+            // Of the axis, by the mean of a section's nodes.
+            let rise = |x: f64| {
+                let at = (0..nodes.len()).filter(|&n| (nodes[n].x - x).abs() < 1e-6);
+                let [sum, count] =
+                    at.fold([0.0; 2], |[s, c], n| [s + history.x[3 * n + 1], c + 1.0]);
+                sum / count
+            };
+            (self.factor, self.sag) = (step.factor, rise(0.0) - rise(HALF + BEYOND));
         }
         Ok(())
     }
