@@ -173,6 +173,14 @@ impl Reader {
             "SOLIDSECTION" => self.solid_section(card),
             "SHELLSECTION" => self.shell_section(card),
             "BEAMSECTION" | "BEAMGENERALSECTION" => self.beam_section(card),
+            "NODALTHICKNESS" => {
+                // No section asks for it, and CalculiX leaves it out as well.
+                self.deck.notes.push(format!(
+                    "line {}: *NODAL THICKNESS says nothing: thicknesses are those of sections",
+                    card.line
+                ));
+                Ok(())
+            }
             // A set without elements needs no section.
             "MEMBRANE" if self.element_sets.contains_key(&card.need("ELSET")?) => {
                 Err(card.fault("*MEMBRANE is not computed"))

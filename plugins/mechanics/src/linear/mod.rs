@@ -38,4 +38,6 @@ pub use read::{concerns, parse};
 pub use solve::{LinearError, Solved};
 
 #[cfg(test)]
+mod checks;
+#[cfg(test)]
 mod tests;
