@@ -65,10 +65,6 @@ impl<'a> Element<'a> {
         self.material
     }
 
-    pub(super) fn nodes(&self) -> usize {
-        self.places.len()
-    }
-
     /// Rows ∂x/∂ξ.
     fn jacobian(&self, jets: &[Jet]) -> [DVec3; 3] {
         std::array::from_fn(|i| jets.iter().zip(&self.places).map(|(j, &x)| j.slope[i] * x).sum())

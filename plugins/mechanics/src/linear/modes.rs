@@ -19,6 +19,8 @@ const TOLERANCE: f64 = 1e-7;
 const SETTLED: f64 = 1e-10;
 /// What of a vector is left counts as nothing, over what it was.
 const NOTHING: f64 = 1e-9;
+/// Vectors, beside eight for each eigenvalue, that are enough for all but what does not converge.
+const ENOUGH: usize = 600;
 /// Stiffness by mass that is added where parts can move freely, over the ratio of both traces.
 const SHIFT: f64 = 1e-9;
 
@@ -91,6 +93,9 @@ impl<'a> Krylov<'a> {
         let mut begin = 0;
         while self.basis.len() < unknowns {
             job.step(self.basis.len(), unknowns).map_err(SolveError::from)?;
+            if self.basis.len() > ENOUGH + 8 * count {
+                return Err(Failed::NotConverged);
+            }
             let end = self.basis.len();
             for j in begin..end {
                 let next = self.solved(&self.pushed[j].clone(), job)?;
