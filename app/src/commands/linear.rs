@@ -46,6 +46,12 @@ struct Step {
     unknowns: usize,
     max_displacement_m: f64,
     max_von_mises_pa: f64,
+    /// Where the step is one of heat.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    max_temperature: Option<f64>,
+    /// Where the step asks for them: 1/s², of heat 1/s, of buckling factors of the loads.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    eigenvalues: Vec<f64>,
 }
 
 /// Computes it and writes what came out.
@@ -87,6 +93,12 @@ pub(crate) fn run(
         let mut files = output::begin(out)?;
         files.write("displacements.csv", displacements(&read.deck, &solved).as_bytes())?;
         files.write("stresses.csv", stresses(&read.deck, &solved).as_bytes())?;
+        if solved.iter().any(|s| !s.temperatures.is_empty()) {
+            files.write("temperatures.csv", temperatures(&read.deck, &solved).as_bytes())?;
+        }
+        if solved.iter().any(|s| !s.eigenvalues.is_empty()) {
+            files.write("eigenvalues.csv", eigenvalues(&solved).as_bytes())?;
+        }
         report.files = files.listed(LIST);
         files.finish(LIST, &report)?;
     }
@@ -101,6 +113,8 @@ fn step(solved: &Solved) -> Step {
         unknowns: solved.unknowns,
         max_displacement_m: largest(&mut solved.displacements.iter().map(|u| u.length())),
         max_von_mises_pa: largest(&mut solved.stresses.iter().flatten().map(von_mises)),
+        max_temperature: solved.temperatures.iter().copied().reduce(f64::max),
+        eigenvalues: solved.eigenvalues.clone(),
     }
 }
 
@@ -110,6 +124,28 @@ fn displacements(deck: &Deck, solved: &[Solved]) -> String {
     for (k, step) in solved.iter().enumerate() {
         for (label, u) in deck.labels().iter().zip(&step.displacements) {
             let _ = writeln!(text, "{},{label},{:?},{:?},{:?}", k + 1, u.x, u.y, u.z);
+        }
+    }
+    text
+}
+
+/// One row a node and step of heat.
+fn temperatures(deck: &Deck, solved: &[Solved]) -> String {
+    let mut text = String::from("step,node,temperature\n");
+    for (k, step) in solved.iter().enumerate() {
+        for (label, t) in deck.labels().iter().zip(&step.temperatures) {
+            let _ = writeln!(text, "{},{label},{t:?}", k + 1);
+        }
+    }
+    text
+}
+
+/// One row an eigenvalue and step.
+fn eigenvalues(solved: &[Solved]) -> String {
+    let mut text = String::from("step,mode,eigenvalue\n");
+    for (k, step) in solved.iter().enumerate() {
+        for (i, value) in step.eigenvalues.iter().enumerate() {
+            let _ = writeln!(text, "{},{},{value:?}", k + 1, i + 1);
         }
     }
     text
@@ -140,6 +176,20 @@ fn table(report: &Report) -> String {
         report.deck, report.nodes, report.elements
     );
     for step in &report.steps {
+        if let Some(warmest) = step.max_temperature {
+            let (name, unknowns) = (&step.name, step.unknowns);
+            let _ = writeln!(text, "{name}: {unknowns} unknowns, largest temperature {warmest:.6}");
+            continue;
+        }
+        if let (Some(first), Some(last)) = (step.eigenvalues.first(), step.eigenvalues.last()) {
+            let count = step.eigenvalues.len();
+            let _ = writeln!(
+                text,
+                "{}: {} unknowns, {count} eigenvalues from {first:.6e} to {last:.6e}",
+                step.name, step.unknowns
+            );
+            continue;
+        }
         let _ = writeln!(
             text,
             "{}: {} unknowns, largest displacement {:.4e} m, largest von Mises stress {:.4e} Pa",

@@ -4,8 +4,9 @@
 
 FOLDER holds .inp files, such as CalculiX' own (Debian: calculix-ccx-test, unpacked) or those of FreeCAD's tests (src/Mod/Fem/femtest/data/calculix).
 `ccx` is looked for in PATH, or named by CCX. What a deck prints is replaced by displacements of all nodes and stresses at all points at the end of every step,
-in global axes. A deck agrees where the largest difference over the largest value is at most 1e-4, for displacements and for stresses, in every step. CalculiX
-writes seven digits. Where its stresses are at other points than ours (beams, shells) only displacements are compared, and the table says so.
+in global axes; by temperatures of all nodes in steps of heat; eigenvalues are those of the list that CalculiX writes. A deck agrees where the largest difference
+over the largest value is at most 1e-4, for displacements, for stresses and for temperatures, in every step, and where every eigenvalue differs by at most 1e-4 of
+itself. CalculiX writes seven digits. Where its stresses are at other points than ours only displacements are compared, and the table says so.
 """
 
 import base64
@@ -20,7 +21,10 @@ from pathlib import Path
 
 AGREES = 1e-4
 PRINTS = ("NODEPRINT", "ELPRINT", "NODEFILE", "ELFILE", "CONTACTFILE", "CONTACTPRINT", "SECTIONPRINT", "FACEPRINT", "NODEOUTPUT", "ELEMENTOUTPUT")
-OURS = "*NODE PRINT,NSET=ZZALL,GLOBAL=YES,FREQUENCY=100000\nU\n*EL PRINT,ELSET=ZZALL,GLOBAL=YES,FREQUENCY=100000\nS\n"
+NODES, POINTS = "*NODE PRINT,NSET=ZZALL,GLOBAL=YES,FREQUENCY=100000", "*EL PRINT,ELSET=ZZALL,GLOBAL=YES,FREQUENCY=100000"
+# What a step without these is asked for would be printed for every mode.
+NOTHING = ["*NODE PRINT,FREQUENCY=0", "*EL PRINT,FREQUENCY=0"]
+KINDS = ("displacements", "stresses", "temperatures", "eigenvalues")
 
 
 def keyword(line):
@@ -38,10 +42,19 @@ def named(kind, numbers):
     return "\n".join([f"*{kind},{kind}=ZZALL", *rows])
 
 
+def asked(procedure, elements):
+    """What a step of this card prints."""
+    name = keyword(procedure) or ""
+    if name in ("FREQUENCY", "BUCKLE") or (name == "HEATTRANSFER" and "FREQUENCY" in procedure.upper()):
+        return NOTHING
+    if name == "HEATTRANSFER":
+        return [NODES, "NT"]
+    return [NODES, "U", POINTS, "S"] if elements else [NODES, "U"]
+
+
 def printing(text, nodes, elements):
     """The deck, printing what is compared and nothing else."""
-    lines, inside, skip = [], False, False
-    ours = OURS if elements else OURS[: OURS.index("*EL")]
+    lines, inside, skip, procedure = [], False, False, ""
     for line in text.splitlines():
         name = keyword(line)
         if name:
@@ -51,16 +64,43 @@ def printing(text, nodes, elements):
                 lines.append(named("NSET", nodes))
                 if elements:
                     lines.append(named("ELSET", elements))
+            if name in ("STATIC", "FREQUENCY", "BUCKLE", "HEATTRANSFER"):
+                procedure = line
             if name == "ENDSTEP":
-                lines.append(ours.rstrip())
+                lines += asked(procedure, elements)
         if not skip:
             lines.append(line)
     return "\n".join(lines) + "\n"
 
 
+def blocks(text):
+    """Blocks of the numbers that CalculiX printed, by kind and in order."""
+    found, kind, into = {kind: [] for kind in KINDS}, None, None
+    for line in text.splitlines():
+        words, head = line.split(), line.strip().replace(" ", "")
+        begun = next((k for k in KINDS if line.strip().startswith(k)), None)
+        if head in ("EIGENVALUEOUTPUT", "BUCKLINGFACTOROUTPUT"):
+            begun = "eigenvalues"
+        if begun:
+            kind, into = begun, {}
+            found[kind].append(into)
+        elif into is not None and words and words[0].isdigit():
+            keys = 2 if kind == "stresses" else 1
+            last = 2 if kind == "eigenvalues" else None
+            into[tuple(map(int, words[:keys]))] = [number(w) for w in words[keys:last]]
+        elif words and kind != "eigenvalues":
+            into = None
+        elif into:
+            # An empty line ends a list that has begun.
+            into = None
+    return found
+
+
 def theirs(program, deck, room, found):
-    """Displacements and stresses of every step by CalculiX; what it says where it fails."""
-    nodes, elements = (sorted({key[0] for key in steps[0]}) if steps else [] for steps in found)
+    """What CalculiX says of every step; its complaint where it fails."""
+    parts = [found["displacements"], found["temperatures"], found["stresses"]]
+    nodes = sorted({key[0] for steps in parts[:2] for key in (steps[0] if steps else ())})
+    elements = sorted({key[0] for key in (parts[2][0] if parts[2] else ())})
     (room / "deck.inp").write_text(printing(deck.read_text(errors="replace"), nodes, elements))
     try:
         ran = subprocess.run([program, "-i", "deck"], cwd=room, capture_output=True, text=True, timeout=300, errors="replace")
@@ -70,21 +110,7 @@ def theirs(program, deck, room, found):
     if ran.returncode or not data.exists():
         complaint = next((line.strip() for line in ran.stdout.splitlines() if "*ERROR" in line), "")
         return None, complaint or f"it ends with {ran.returncode}"
-    moved, stressed, into = [], [], None
-    for line in data.read_text().splitlines():
-        words = line.split()
-        if line.strip().startswith("displacements"):
-            into = {}
-            moved.append(into)
-        elif line.strip().startswith("stresses"):
-            into = {}
-            stressed.append(into)
-        elif words and words[0].isdigit() and into is not None:
-            keys = 1 if into is moved[-1] else 2
-            into[tuple(map(int, words[:keys]))] = [number(w) for w in words[keys : keys + 3 * keys]]
-        elif words:
-            into = None
-    return (moved, stressed), ""
+    return blocks(data.read_text()), ""
 
 
 def array(text, name):
@@ -113,22 +139,22 @@ def ours(program, deck, out):
     if ran.returncode not in (0, 4) or not (out / "analyze.json").exists():
         lines = ran.stderr.strip().splitlines() or ["it ends with no word"]
         return None, lines[-1].replace(str(deck), deck.name)
+    nothing = {kind: [] for kind in KINDS}
     if not (out / "displacements.csv").exists():
-        return ([of_members(deck, out)], []), ""
-    tables = []
-    for name, keys in [("displacements.csv", 1), ("stresses.csv", 2)]:
-        steps = []
-        with open(out / name) as lines:
-            for step, *row in list(csv.reader(lines))[1:]:
-                while len(steps) < int(step):
-                    steps.append({})
-                steps[-1][tuple(map(int, row[:keys]))] = [float(w) for w in row[keys:]]
-        tables.append(steps)
+        return nothing | {"displacements": [of_members(deck, out)]}, ""
+    tables = dict(nothing)
+    for kind in KINDS:
+        path, steps, keys = out / f"{kind}.csv", {}, 2 if kind == "stresses" else 1
+        if path.exists():
+            with open(path) as lines:
+                for step, *row in list(csv.reader(lines))[1:]:
+                    steps.setdefault(int(step), {})[tuple(map(int, row[:keys]))] = [float(w) for w in row[keys:]]
+        tables[kind] = [steps[k] for k in sorted(steps)]
     # xx, yy, zz, xy, yz, zx as CalculiX writes them: xx, yy, zz, xy, xz, yz.
-    for step in tables[1]:
+    for step in tables["stresses"]:
         for key, (xx, yy, zz, xy, yz, zx) in step.items():
             step[key] = [xx, yy, zz, xy, zx, yz]
-    return tuple(tables), ""
+    return tables, ""
 
 
 def apart(a, b):
@@ -141,13 +167,22 @@ def apart(a, b):
     return most / size if size > 0 else most
 
 
+def aside(a, b):
+    """The largest difference of an eigenvalue over itself; those at nothing over the largest."""
+    if not a or len(b) < len(a):
+        return None
+    floor = 1e-8 * max(abs(v[0]) for v in a.values())
+    return max(abs(v[0] - b[k][0]) / max(abs(v[0]), floor) for k, v in a.items())
+
+
 def compared(found, given):
-    """Largest differences of displacements and of stresses over the steps."""
-    worst = []
-    for a, b in zip(given, found):
-        pairs = list(zip(a[-len(b) :], b))
-        all_steps = [apart(x, y) for x, y in pairs]
-        worst.append(max(all_steps) if all_steps and None not in all_steps else None)
+    """The largest difference of every kind over the steps; none where it cannot be compared."""
+    worst = {}
+    for kind in KINDS:
+        a, b = given[kind], found[kind]
+        each = [(aside if kind == "eigenvalues" else apart)(x, y) for x, y in zip(a[-len(b) :], b)]
+        whole = len(a) >= len(b) > 0 and None not in each
+        worst[kind] = max(each) if whole else None
     return worst
 
 
@@ -156,15 +191,19 @@ def row(program, peer, deck):
         room = Path(name)
         found, refusal = ours(program, deck, room / "out")
         if found is None:
-            return [deck.name, "refused", "", "", refusal.split(": ", 1)[-1]]
+            return [deck.name, "refused", "", "", "", "", refusal.split(": ", 1)[-1]]
         given, complaint = theirs(peer, deck, room, found)
         if given is None:
-            return [deck.name, "read", "", "", f"CalculiX: {complaint}"]
-        moved, stressed = compared(found, given)
-        agrees = moved is not None and moved <= AGREES and (stressed is None or stressed <= AGREES)
-        note = "" if stressed is not None else "stresses not at the same points"
+            return [deck.name, "read", "", "", "", "", f"CalculiX: {complaint}"]
+        worst = compared(found, given)
+        wanted = [kind for kind in KINDS if found[kind]]
+        # Of beams and shells of members stresses are at other points.
+        idle = [kind for kind in wanted if kind == "stresses" and worst[kind] is None]
+        agrees = all(kind in idle or (worst[kind] is not None and worst[kind] <= AGREES) for kind in wanted)
+        missing = [kind for kind in wanted if worst[kind] is None]
+        note = f"{', '.join(missing)} not at the same points" if missing else ""
         show = lambda x: "" if x is None else f"{x:.1e}"
-        return [deck.name, "agrees" if agrees else "read", show(moved), show(stressed), note]
+        return [deck.name, "agrees" if agrees and wanted != idle else "read", *(show(worst[kind]) for kind in KINDS), note]
 
 
 def main():
@@ -172,7 +211,7 @@ def main():
     peer = os.environ.get("CCX", "ccx")
     rows = [row(program, peer, deck) for deck in sorted(folder.glob("*.inp"))]
     with open(table, "w", newline="") as out:
-        csv.writer(out).writerows([["deck", "state", "displacements", "stresses", "why"], *rows])
+        csv.writer(out).writerows([["deck", "state", *KINDS, "why"], *rows])
     count = lambda *states: sum(r[1] in states for r in rows)
     print(f"{len(rows)} decks: {count('read', 'agrees')} read, {count('agrees')} agree within {AGREES:g}, {count('refused')} refused; {table}")
 

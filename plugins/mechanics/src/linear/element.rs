@@ -1,27 +1,42 @@
 //! One element: its stiffness, its forces, its stresses.
 
 use glam::DVec3;
+use nalgebra::{DMatrix, DVector};
 
 use super::{
-    model::{Cell, Deck, Material, Orientation},
-    shape::{Jet, Shape, face_functions},
+    model::{Cell, Deck, Material, Orientation, Step},
+    shape::{Jet, Point, Shape, face_functions},
 };
-use crate::tensor::{self, Tangent, Voigt};
+use crate::tensor::{self, Frame, Tangent, Voigt};
 
 /// An element that is flat or turned inside out.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Folded;
 
 /// Functions at a point with their slopes in space, its place and its volume.
-struct At {
-    jets: Vec<Jet>,
-    slopes: Vec<[f64; 3]>,
-    place: DVec3,
-    volume: f64,
+pub(super) struct At {
+    pub(super) jets: Vec<Jet>,
+    pub(super) slopes: Vec<[f64; 3]>,
+    pub(super) place: DVec3,
+    pub(super) volume: f64,
+}
+
+impl At {
+    /// What a field of the nodes is there.
+    pub(super) fn value(&self, nodes: &[f64]) -> f64 {
+        self.jets.iter().zip(nodes).map(|(j, t)| j.value * t).sum()
+    }
+}
+
+/// Temperatures of the nodes of an element: now, and where it has no strain.
+pub(super) struct Warmth {
+    pub(super) now: Vec<f64>,
+    pub(super) cold: Vec<f64>,
 }
 
 /// An element with the places of its nodes.
 pub(super) struct Element<'a> {
+    deck: &'a Deck,
     cell: &'a Cell,
     material: &'a Material,
     orientation: Option<&'a Orientation>,
@@ -29,70 +44,153 @@ pub(super) struct Element<'a> {
 }
 
 impl<'a> Element<'a> {
-    pub(super) fn new(deck: &'a Deck, cell: &'a Cell) -> Self {
+    /// A cell, of what a step says that it is made of.
+    pub(super) fn new(deck: &'a Deck, step: &Step, e: usize) -> Self {
+        let cell = &deck.cells[e];
+        let material = step.materials.get(&(e as u32)).unwrap_or(&cell.material);
         Self {
+            deck,
             cell,
-            material: &deck.materials[cell.material as usize],
+            material: &deck.materials[*material as usize],
             orientation: cell.orientation.map(|o| &deck.orientations[o as usize]),
             places: cell.nodes.iter().map(|&n| deck.nodes[n as usize]).collect(),
         }
     }
 
-    fn at(&self, natural: [f64; 3], weight: f64) -> Result<At, Folded> {
+    pub(super) fn shape(&self) -> Shape {
+        self.cell.shape
+    }
+
+    pub(super) fn material(&self) -> &Material {
+        self.material
+    }
+
+    /// Rows ∂x/∂ξ.
+    fn jacobian(&self, jets: &[Jet]) -> [DVec3; 3] {
+        std::array::from_fn(|i| jets.iter().zip(&self.places).map(|(j, &x)| j.slope[i] * x).sum())
+    }
+
+    pub(super) fn at(&self, natural: [f64; 3], weight: f64) -> Result<At, Folded> {
         let jets = self.cell.shape.functions(natural);
-        let mut j = [[0.0; 3]; 3];
-        let mut place = DVec3::ZERO;
-        for (jet, x) in jets.iter().zip(&self.places) {
-            place += jet.value * *x;
-            for (row, slope) in j.iter_mut().zip(jet.slope) {
-                row.iter_mut().zip(x.to_array()).for_each(|(j, x)| *j += slope * x);
-            }
-        }
-        let [a, b, c] = j.map(DVec3::from_array);
-        let determinant = a.dot(b.cross(c));
-        if !(determinant > 0.0 && determinant.is_finite()) {
-            return Err(Folded);
-        }
-        // Rows of the inverse's transpose: ∂ξ/∂x.
-        let inverse = [b.cross(c), c.cross(a), a.cross(b)].map(|v| v / determinant);
+        let place = jets.iter().zip(&self.places).map(|(j, &x)| j.value * x).sum();
+        let jacobian = self.jacobian(&jets);
+        let inverse = inverse_transposed(&jacobian).ok_or(Folded)?;
         let slopes = jets
             .iter()
             .map(|jet| (0..3).map(|i| jet.slope[i] * inverse[i]).sum::<DVec3>().to_array())
             .collect();
-        Ok(At { jets, slopes, place, volume: determinant * weight })
+        let volume = weight * jacobian[0].dot(jacobian[1].cross(jacobian[2]));
+        Ok(At { jets, slopes, place, volume })
     }
 
-    fn law(&self, place: DVec3) -> Tangent {
-        match self.orientation {
-            None => self.material.stiffness,
-            Some(o) => tensor::rotate_tangent(&self.material.stiffness, &o.frame(place)),
+    /// Points of integration.
+    pub(super) fn points(&self) -> Vec<Point> {
+        if self.cell.points.is_empty() {
+            self.cell.shape.points()
+        } else {
+            self.cell.points.clone()
         }
     }
 
-    /// Strain of free swelling by one degree.
-    fn swelling(&self, place: DVec3) -> Voigt {
-        let [x, y, z] = self.material.expansion;
-        let local = [x, y, z, 0.0, 0.0, 0.0];
-        self.orientation
-            .map_or(local, |o| tensor::rotate_strain(&local, &tensor::transposed(&o.frame(place))))
+    /// Those for masses.
+    fn mass_points(&self) -> Vec<Point> {
+        if self.cell.points.is_empty() {
+            self.cell.shape.fine_points()
+        } else {
+            self.cell.points.clone()
+        }
+    }
+
+    /// Material and axes at a point of integration.
+    fn matter(&self, point: usize) -> (&Material, Option<&Orientation>) {
+        match self.cell.layers.get(point) {
+            None => (self.material, self.orientation),
+            Some(&(material, axes)) => (
+                &self.deck.materials[material as usize],
+                axes.map(|o| &self.deck.orientations[o as usize]),
+            ),
+        }
+    }
+
+    /// The axes of its material there, as rows.
+    pub(super) fn frame(&self, place: DVec3) -> Option<Frame> {
+        self.orientation.map(|o| o.frame(place))
+    }
+
+    /// The law at a point of integration, and the strain of free swelling there.
+    fn local(&self, point: usize, at: &At, warmth: &Warmth) -> (Tangent, Voigt) {
+        let [now, cold] = self.warmth(point, at, warmth);
+        let (material, axes) = self.matter(point);
+        let law = material.elastic.as_ref().map_or([[0.0; 6]; 6], |l| l.stiffness(now));
+        let free = material.expansion.as_ref().map_or([0.0; 3], |l| l.strain(now, cold));
+        let free = [free[0], free[1], free[2], 0.0, 0.0, 0.0];
+        match axes.map(|o| o.frame(at.place)) {
+            None => (law, free),
+            Some(frame) => (
+                tensor::rotate_tangent(&law, &frame),
+                tensor::rotate_strain(&free, &tensor::transposed(&frame)),
+            ),
+        }
+    }
+
+    /// As [`Element::at`], with the slopes of bubbles after those of the nodes where the shape has
+    /// some: 1 − ξ² of each axis, with the Jacobian of the middle so that a constant strain stays
+    /// one (Taylor, Beresford and Wilson 1976).
+    fn bubbled(&self, natural: [f64; 3], weight: f64) -> Result<At, Folded> {
+        let mut at = self.at(natural, weight)?;
+        if self.cell.shape != Shape::Hex8Bubbles {
+            return Ok(at);
+        }
+        let middle = self.jacobian(&self.cell.shape.functions([0.0; 3]));
+        let inverse = inverse_transposed(&middle).ok_or(Folded)?;
+        let shrink = middle[0].dot(middle[1].cross(middle[2])) * weight / at.volume;
+        let slope = |i: usize| (-2.0 * natural[i] * shrink * inverse[i]).to_array();
+        at.slopes.extend((0..3).map(slope));
+        Ok(at)
     }
 
     /// K, row by row, and the forces of what strains it: warmth of the nodes and stress that it
     /// has from the beginning.
     pub(super) fn stiffness(
         &self,
-        warmth: &[f64],
+        warmth: &Warmth,
         initial: impl Fn(usize) -> Voigt,
         k: &mut [f64],
         f: &mut [f64],
     ) -> Result<(), Folded> {
-        let n = self.places.len();
-        for (p, (natural, weight)) in self.cell.shape.points().into_iter().enumerate() {
-            let at = self.at(natural, weight)?;
-            let law = self.law(at.place);
-            let warm = self.warmth(p, &at.jets, warmth);
-            let free = tensor::apply(&law, &tensor::scale(&self.swelling(at.place), warm));
-            let stress = tensor::sub(&free, &initial(p));
+        let n = 3 * self.places.len();
+        let Some((bubbles, forces)) = self.summed(warmth, &initial, k, f)? else { return Ok(()) };
+        // What the bubbles do follows from the rest: they bear no force from outside.
+        let (inside, across) = (bubbles.view((n, n), (9, 9)), bubbles.view((n, 0), (9, n)));
+        let inverse = inside.into_owned().cholesky().ok_or(Folded)?;
+        let carried = across.transpose() * inverse.solve(&across.into_owned());
+        let pushed = across.transpose() * inverse.solve(&forces.rows(n, 9).into_owned());
+        for i in 0..n {
+            (0..n).for_each(|j| k[i * n + j] += bubbles[(i, j)] - carried[(i, j)]);
+            f[i] += forces[i] - pushed[i];
+        }
+        Ok(())
+    }
+
+    /// Sums over the points: into `k` and `f`, or, where there are bubbles, into a matrix and a
+    /// vector with nine rows more.
+    fn summed(
+        &self,
+        warmth: &Warmth,
+        initial: &impl Fn(usize) -> Voigt,
+        k: &mut [f64],
+        f: &mut [f64],
+    ) -> Result<Option<(DMatrix<f64>, DVector<f64>)>, Folded> {
+        let has_bubbles = self.cell.shape == Shape::Hex8Bubbles;
+        let n = self.places.len() + if has_bubbles { 3 } else { 0 };
+        let size = if has_bubbles { 3 * n } else { 0 };
+        let mut all = (DMatrix::zeros(size, size), DVector::zeros(size));
+        let (k, f) =
+            if has_bubbles { (all.0.as_mut_slice(), all.1.as_mut_slice()) } else { (k, f) };
+        for (p, (natural, weight)) in self.points().into_iter().enumerate() {
+            let at = self.bubbled(natural, weight)?;
+            let (law, free) = self.local(p, &at, warmth);
+            let stress = tensor::sub(&tensor::apply(&law, &free), &initial(p));
             for a in 0..n {
                 let force = transposed_times(&at.slopes[a], &stress);
                 (0..3).for_each(|i| f[3 * a + i] += at.volume * force[i]);
@@ -107,50 +205,59 @@ impl<'a> Element<'a> {
                 }
             }
         }
-        Ok(())
+        Ok(has_bubbles.then_some(all))
     }
 
-    /// Temperature over that without strain at a point. CalculiX takes the mean in a C3D8, and in a
+    /// Temperatures at a point, now and without strain. CalculiX takes the mean in a C3D8, and in a
     /// C3D20 what eight points say, linear between them, so that strain of warmth and of
     /// displacement are of one degree.
-    fn warmth(&self, point: usize, jets: &[Jet], nodes: &[f64]) -> f64 {
-        let mean = |jets: &[Jet]| jets.iter().zip(nodes).map(|(j, t)| j.value * t).sum::<f64>();
-        match self.cell.shape {
+    fn warmth(&self, point: usize, at: &At, warmth: &Warmth) -> [f64; 2] {
+        [&warmth.now, &warmth.cold].map(|nodes| match self.cell.shape {
             Shape::Hex8 => nodes.iter().sum::<f64>() / nodes.len() as f64,
             Shape::Hex20 => {
                 let (natural, _) = Shape::Hex20.points()[point];
                 let few = Shape::Hex20Reduced.points();
+                let mean = |jets: &[Jet]| jets.iter().zip(nodes).map(|(j, t)| j.value * t).sum();
                 // Weights of the eight points, each a corner of a cube of their own.
                 let corners = few.iter().zip(natural_corners()).map(|((at, _), corner)| {
                     let share: f64 = (0..3)
                         .map(|i| 0.5 * (1.0 + corner[i] * natural[i] / at[i].abs()))
                         .product();
-                    share * mean(&Shape::Hex20.functions(*at))
+                    let mean: f64 = mean(&Shape::Hex20.functions(*at));
+                    share * mean
                 });
                 corners.sum()
             }
-            _ => mean(jets),
-        }
+            _ => at.value(nodes),
+        })
     }
 
     /// Stress at every point for these displacements.
     pub(super) fn stresses(
         &self,
         displacement: &[f64],
-        warmth: &[f64],
+        warmth: &Warmth,
         initial: impl Fn(usize) -> Voigt,
     ) -> Result<Vec<Voigt>, Folded> {
-        let points = self.cell.shape.points().into_iter().enumerate();
+        let mut moved = displacement.to_vec();
+        let n = moved.len();
+        if self.cell.shape == Shape::Hex8Bubbles
+            && let Some((bubbles, forces)) = self.summed(warmth, &initial, &mut [], &mut [])?
+        {
+            let inside = bubbles.view((n, n), (9, 9)).into_owned().cholesky().ok_or(Folded)?;
+            let pulled = bubbles.view((n, 0), (9, n)) * DVector::from_column_slice(displacement);
+            moved.extend(inside.solve(&(forces.rows(n, 9) - pulled)).iter());
+        }
+        let points = self.points().into_iter().enumerate();
         let stress = |(p, (natural, weight)): (usize, ([f64; 3], f64))| {
-            let at = self.at(natural, weight)?;
+            let at = self.bubbled(natural, weight)?;
             let mut strain = tensor::ZERO;
-            for (slope, u) in at.slopes.iter().zip(displacement.as_chunks::<3>().0) {
+            for (slope, u) in at.slopes.iter().zip(moved.as_chunks::<3>().0) {
                 let parts = strains(slope);
                 (0..6).for_each(|c| strain[c] += (0..3).map(|i| parts[i][c] * u[i]).sum::<f64>());
             }
-            let warm = self.warmth(p, &at.jets, warmth);
-            let strain = tensor::sub(&strain, &tensor::scale(&self.swelling(at.place), warm));
-            Ok(tensor::add(&tensor::apply(&self.law(at.place), &strain), &initial(p)))
+            let (law, free) = self.local(p, &at, warmth);
+            Ok(tensor::add(&tensor::apply(&law, &tensor::sub(&strain, &free)), &initial(p)))
         };
         points.map(stress).collect()
     }
@@ -161,7 +268,7 @@ impl<'a> Element<'a> {
         density: impl Fn(DVec3) -> DVec3,
         f: &mut [f64],
     ) -> Result<(), Folded> {
-        for (natural, weight) in self.cell.shape.points() {
+        for (natural, weight) in self.points() {
             let at = self.at(natural, weight)?;
             let force = at.volume * density(at.place);
             for (jet, f) in at.jets.iter().zip(f.as_chunks_mut::<3>().0) {
@@ -171,27 +278,76 @@ impl<'a> Element<'a> {
         Ok(())
     }
 
-    /// Forces of a pressure on a face.
-    pub(super) fn pressure(&self, face: usize, pressure: f64, f: &mut [f64]) {
-        let Some(nodes) = self.cell.shape.faces().nth(face) else { return };
-        for (natural, weight) in self.cell.shape.face_points(nodes.len()) {
+    /// Points of a face: the functions of its nodes there, and its area as a vector outward.
+    pub(super) fn face_points(&self, face: usize) -> Vec<(Vec<Jet>, DVec3)> {
+        let Some(nodes) = self.cell.shape.faces().nth(face) else { return Vec::new() };
+        let point = |(natural, weight): ([f64; 2], f64)| {
             let jets = face_functions(nodes.len(), natural);
             let along = |i: usize| -> DVec3 {
                 jets.iter().zip(nodes).map(|(j, &n)| j.slope[i] * self.places[n]).sum()
             };
-            // Length is area.
-            let outward = along(0).cross(along(1));
+            let area = weight * along(0).cross(along(1));
+            (jets, area)
+        };
+        self.cell.shape.face_points(nodes.len()).into_iter().map(point).collect()
+    }
+
+    /// Forces of a pressure on a face.
+    pub(super) fn pressure(&self, face: usize, pressure: f64, f: &mut [f64]) {
+        let Some(nodes) = self.cell.shape.faces().nth(face) else { return };
+        for (jets, area) in self.face_points(face) {
             for (jet, &n) in jets.iter().zip(nodes) {
-                let force = -pressure * weight * jet.value * outward;
+                let force = -pressure * jet.value * area;
                 (0..3).for_each(|i| f[3 * n + i] += force[i]);
             }
         }
     }
 
-    /// kg/m³.
-    pub(super) fn density(&self) -> f64 {
-        self.material.density
+    /// ∫ ρ N Nᵀ, row by row, with points enough for the square of its functions.
+    pub(super) fn mass(&self, warmth: &Warmth, m: &mut [f64]) -> Result<(), Folded> {
+        let n = self.places.len();
+        for (natural, weight) in self.mass_points() {
+            let at = self.at(natural, weight)?;
+            let density = self.density(at.value(&warmth.now));
+            for (a, b) in pairs(n) {
+                let value = at.volume * density * at.jets[a].value * at.jets[b].value;
+                (0..3).for_each(|i| m[(3 * a + i) * 3 * n + 3 * b + i] += value);
+            }
+        }
+        Ok(())
     }
+
+    /// ∫ ∇N · σ ∇N, row by row: what stresses add to the stiffness where displacements are small
+    /// (Zienkiewicz and Taylor, vol. 2, ch. 10).
+    pub(super) fn stress_stiffness(&self, stress: &[Voigt], k: &mut [f64]) -> Result<(), Folded> {
+        let n = self.places.len();
+        for ((natural, weight), stress) in self.points().into_iter().zip(stress) {
+            let at = self.at(natural, weight)?;
+            for (a, b) in pairs(n) {
+                let pulled = DVec3::from_array(transposed_times(&at.slopes[a], stress));
+                let value = at.volume * pulled.dot(DVec3::from_array(at.slopes[b]));
+                (0..3).for_each(|i| k[(3 * a + i) * 3 * n + 3 * b + i] += value);
+            }
+        }
+        Ok(())
+    }
+
+    /// kg/m³.
+    pub(super) fn density(&self, temperature: f64) -> f64 {
+        self.material.density.as_ref().map_or(0.0, |d| d.at(temperature)[0])
+    }
+}
+
+/// All pairs of so many.
+pub(super) fn pairs(n: usize) -> impl Iterator<Item = (usize, usize)> {
+    (0..n).flat_map(move |a| (0..n).map(move |b| (a, b)))
+}
+
+/// ∂ξ/∂x of rows ∂x/∂ξ, as columns; none of what is flat or turned inside out.
+fn inverse_transposed([a, b, c]: &[DVec3; 3]) -> Option<[DVec3; 3]> {
+    let determinant = a.dot(b.cross(*c));
+    let upright = determinant > 0.0 && determinant.is_finite();
+    upright.then(|| [b.cross(*c), c.cross(*a), a.cross(*b)].map(|v| v / determinant))
 }
 
 /// The corners of a cube in the order of its eight points of integration.

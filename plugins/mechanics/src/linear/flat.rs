@@ -88,6 +88,7 @@ fn make_sides(deck: &mut Deck, plane: Plane, node: u32, thickness: f64) -> [u32;
             (middle + 0.5 * side * thickness * DVec3::Z, [1.0, 0.0])
         };
         deck.nodes.push(place);
+        deck.twins.insert(number, node);
         let mut bind = |terms: Vec<(u32, f64)>| {
             deck.equations.push(Equation { terms, value: 0.0, line: 0 });
         };

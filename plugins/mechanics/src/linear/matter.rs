@@ -4,8 +4,11 @@ use glam::DVec3;
 use nalgebra::Matrix3;
 
 use super::{
+    law::{Elastic, Expansion, Table},
     model::{Material, Orientation},
     read::{Kind, Reader, Section, plain},
+    shape::Shape,
+    thin::{Hollow, Profile, Thin},
 };
 use crate::{
     read::{
@@ -13,11 +16,8 @@ use crate::{
         abaqus::card::{Card, Row},
         quote,
     },
-    tensor::{self, Frame, Tangent},
+    tensor::Frame,
 };
-
-/// Abaqus' order 11, 22, 33, 12, 13, 23 in ours.
-pub(super) const ORDER: [usize; 6] = [0, 1, 2, 3, 5, 4];
 
 impl Reader {
     /// Materials, orientations, transforms and amplitudes.
@@ -29,12 +29,7 @@ impl Reader {
                 card.only(&["NAME"])?;
                 let name = card.need("NAME")?;
                 self.materials.insert(name.clone(), self.deck.materials.len() as u32);
-                self.deck.materials.push(Material {
-                    name,
-                    stiffness: [[0.0; 6]; 6],
-                    expansion: [0.0; 3],
-                    density: 0.0,
-                });
+                self.deck.materials.push(Material { name, ..Material::default() });
                 self.in_material = true;
                 Ok(())
             }
@@ -54,35 +49,44 @@ impl Reader {
 
     fn property(&mut self, card: &Card<'_>, name: &str) -> Result<(), Fault> {
         let numbers = all_numbers(card)?;
-        let stress = self.units.stress();
-        let index = self.deck.materials.len() as u32 - 1;
+        let units = self.units;
         let Some(material) = self.deck.materials.last_mut() else { return Ok(()) };
         let kind = card.word("TYPE").unwrap_or_default();
         match name {
             "ELASTIC" => {
                 card.only(&["TYPE"])?;
-                let law = elastic(card, &kind, &numbers)?;
-                material.stiffness = law.map(|row| row.map(|v| v * stress));
-                self.elastic.insert(index);
+                material.elastic = Some(elastic(card, &kind, &numbers, units.stress())?);
             }
             "EXPANSION" => {
                 card.only(&["TYPE", "ZERO"])?;
-                material.expansion = match (kind.as_str(), counted(card, &numbers, &[1, 3])?) {
-                    ("" | "ISO" | "ISOTROPIC", [a]) => [*a; 3],
-                    ("ORTHO" | "ORTHOTROPIC", [a, b, c]) => [*a, *b, *c],
-                    _ => return Err(card.fault("*EXPANSION: ISO has one number, ORTHO three")),
-                };
+                let zero = card.get("ZERO").map_or(Ok(0.0), |z| {
+                    z.parse().map_err(|_| card.fault(format!("ZERO={}: a temperature", quote(z))))
+                })?;
+                let table = along_axes(card, &kind, &numbers)?;
+                material.expansion = Some(Expansion { table, zero });
             }
             "DENSITY" => {
                 card.only(&[])?;
-                let [density] = counted(card, &numbers, &[1])? else { return Ok(()) };
-                if !density.is_finite() || *density < 0.0 {
-                    return Err(card.fault(format!("density must not be below 0, not {density}")));
+                let table = table::<1>(card, &numbers)?;
+                if let Some(rho) = table.rows().flatten().find(|r| !r.is_finite() || **r < 0.0) {
+                    return Err(card.fault(format!("density must not be below 0, not {rho}")));
                 }
-                material.density = density * self.units.density();
+                material.density = Some(table.scaled(units.density()));
             }
-            // Heat flows nowhere in a static step.
-            _ => {}
+            "CONDUCTIVITY" => {
+                card.only(&["TYPE"])?;
+                // W/(m·K) is N/(s·K), whatever the unit of length.
+                let table = along_axes(card, &kind, &numbers)?;
+                if let Some(k) = table.rows().flatten().find(|k| !k.is_finite() || **k <= 0.0) {
+                    return Err(card.fault(format!("conductivity must be above 0, not {k}")));
+                }
+                material.conductivity = Some(table);
+            }
+            _ => {
+                card.only(&[])?;
+                let table = table::<1>(card, &numbers)?;
+                material.specific_heat = Some(table.scaled(units.specific_heat()));
+            }
         }
         Ok(())
     }
@@ -165,34 +169,180 @@ impl Reader {
 
     /// What elements are made of.
     pub(super) fn section(&mut self, card: &Card<'_>) -> Result<(), Fault> {
-        if plain(card) != "SOLIDSECTION" {
-            return Ok(());
+        match plain(card).as_str() {
+            "SOLIDSECTION" => self.solid_section(card),
+            "SHELLSECTION" => self.shell_section(card),
+            "BEAMSECTION" | "BEAMGENERALSECTION" => self.beam_section(card),
+            "NODALTHICKNESS" => {
+                // No section asks for it, and CalculiX leaves it out as well.
+                self.deck.notes.push(format!(
+                    "line {}: *NODAL THICKNESS says nothing: thicknesses are those of sections",
+                    card.line
+                ));
+                Ok(())
+            }
+            // A set without elements needs no section.
+            "MEMBRANE" if self.element_sets.contains_key(&card.need("ELSET")?) => {
+                Err(card.fault("*MEMBRANE is not computed"))
+            }
+            _ => Ok(()),
         }
+    }
+
+    fn solid_section(&mut self, card: &Card<'_>) -> Result<(), Fault> {
         card.only(&["ELSET", "MATERIAL", "ORIENTATION", "OFFSET"])?;
         if card.get("OFFSET").is_some_and(|o| o.parse::<f64>() != Ok(0.0)) {
             return Err(card.fault("*SOLID SECTION: only OFFSET=0 is supported"));
         }
-        let (set, material) = (card.need("ELSET")?, card.need("MATERIAL")?);
-        let missing =
-            |what: &str, name: &str| card.fault(format!("{what} {} is not defined", quote(name)));
-        let &material =
-            self.materials.get(&material).ok_or_else(|| missing("material", &material))?;
-        let orientation = match super::mesh::name_of(card, "ORIENTATION")? {
-            None => None,
-            Some(name) => {
-                Some(*self.orientations.get(&name).ok_or_else(|| missing("orientation", &name))?)
-            }
-        };
         let thickness = all_numbers(card)?.first().copied().unwrap_or(1.0) * self.units.length();
-        let elements = self.element_sets.get(&set).ok_or_else(|| missing("element set", &set))?;
-        for &element in elements {
-            let raw = &mut self.raw[element as usize];
-            if matches!(raw.kind, Kind::Flat(_)) && (thickness.is_nan() || thickness <= 0.0) {
-                return Err(card.fault(format!("thickness of {set} must be above 0")));
+        let section = Section {
+            material: self.named_material(card, &card.need("MATERIAL")?)?,
+            orientation: self.named_orientation(card)?,
+            thickness,
+            profile: Profile::Whole,
+        };
+        let fits = |kind: Kind| !matches!(kind, Kind::Thin(_));
+        if thickness.is_nan() || thickness <= 0.0 {
+            let set = self.named_elements(card)?;
+            let flat = |e: &u32| matches!(self.raw[*e as usize].kind, Kind::Flat(_));
+            if set.iter().any(flat) {
+                return Err(card.fault("the thickness must be above 0"));
             }
-            raw.section = Some(Section { material, orientation, thickness });
+        }
+        self.assign(card, &section, fits)
+    }
+
+    /// Gives a set of elements what they are made of.
+    fn assign(
+        &mut self,
+        card: &Card<'_>,
+        section: &Section,
+        fits: impl Fn(Kind) -> bool,
+    ) -> Result<(), Fault> {
+        for element in self.named_elements(card)? {
+            let raw = &mut self.raw[element as usize];
+            if !fits(raw.kind) {
+                return Err(card.fault(format!(
+                    "*{} says nothing of element {}, which is of another kind",
+                    card.name, raw.label
+                )));
+            }
+            raw.section = Some(section.clone());
         }
         Ok(())
+    }
+
+    fn named_material(&self, card: &Card<'_>, name: &str) -> Result<u32, Fault> {
+        let undefined = || card.fault(format!("material {} is not defined", quote(name)));
+        self.materials.get(&name.to_ascii_uppercase()).copied().ok_or_else(undefined)
+    }
+
+    fn named_orientation(&self, card: &Card<'_>) -> Result<Option<u32>, Fault> {
+        let Some(name) = super::mesh::name_of(card, "ORIENTATION")? else { return Ok(None) };
+        self.axes_of(card, &name).map(Some)
+    }
+
+    fn axes_of(&self, card: &Card<'_>, name: &str) -> Result<u32, Fault> {
+        let undefined = || card.fault(format!("orientation {} is not defined", quote(name)));
+        self.orientations.get(&name.to_ascii_uppercase()).copied().ok_or_else(undefined)
+    }
+
+    fn shell_section(&mut self, card: &Card<'_>) -> Result<(), Fault> {
+        card.only(&["ELSET", "MATERIAL", "ORIENTATION", "OFFSET", "COMPOSITE"])?;
+        let offset = match card.word("OFFSET").as_deref() {
+            None => 0.0,
+            Some("SPOS") => -0.5,
+            Some("SNEG") => 0.5,
+            Some(word) => {
+                word.parse().map_err(|_| card.fault("OFFSET is a number, SPOS or SNEG"))?
+            }
+        };
+        let mut layers = Vec::new();
+        let mut thickness = 0.0;
+        for row in card.rows() {
+            let words: Vec<&str> = row.fields().collect();
+            let own = row.number(words[0])? * self.units.length();
+            if own.is_nan() || own <= 0.0 {
+                return Err(row.fault("a thickness must be above 0"));
+            }
+            thickness += own;
+            if card.get("COMPOSITE").is_none() {
+                continue;
+            }
+            let word = |i: usize| words.get(i).copied().filter(|w| !w.is_empty());
+            let material = word(2).ok_or_else(|| row.fault("needed are: thickness, , material"))?;
+            let axes = word(3).map(|name| self.axes_of(card, name)).transpose()?;
+            layers.push((own, self.named_material(card, material)?, axes));
+        }
+        if thickness == 0.0 {
+            return Err(card.fault("*SHELL SECTION needs its thickness"));
+        }
+        let material = match layers.first() {
+            Some(layer) => layer.1,
+            None => self.named_material(card, &card.need("MATERIAL")?)?,
+        };
+        let layered = !layers.is_empty();
+        let section = Section {
+            material,
+            orientation: self.named_orientation(card)?,
+            thickness,
+            profile: Profile::Shell { offset, layers },
+        };
+        self.assign(card, &section, |kind| match kind {
+            // Layers have eight points each.
+            Kind::Thin(Thin::Shell { shape, .. }) => !layered || shape == Shape::Hex20Reduced,
+            _ => false,
+        })
+    }
+
+    fn beam_section(&mut self, card: &Card<'_>) -> Result<(), Fault> {
+        card.only(&["ELSET", "MATERIAL", "SECTION", "OFFSET1", "OFFSET2"])?;
+        for offset in ["OFFSET1", "OFFSET2"] {
+            if card.get(offset).is_some_and(|o| o.parse::<f64>() != Ok(0.0)) {
+                return Err(card.fault(format!("*{}: only {offset}=0 is supported", card.name)));
+            }
+        }
+        let mut rows = card.rows();
+        let sizes = rows.next().ok_or_else(|| card.fault("needed are: sizes of the section"))?;
+        let length = self.units.length();
+        let sizes: Vec<f64> = sizes.numbers("sizes", 1..=8)?.iter().map(|s| s * length).collect();
+        if sizes.iter().any(|s| s.is_nan() || *s <= 0.0) {
+            return Err(card.fault("sizes of a section must be above 0"));
+        }
+        let first = match rows.next() {
+            Some(row) => DVec3::from_slice(&row.numbers("x, y, z of the 1-direction", 3..=3)?),
+            None => DVec3::NEG_Z,
+        };
+        let (size, hollow) = match (card.word("SECTION").as_deref(), sizes.as_slice()) {
+            (Some("RECT"), &[a, b]) => ([a, b], None),
+            (Some("RECT"), &[a]) => ([a, a], None),
+            (Some("PIPE"), &[radius, wall]) if wall < radius => {
+                ([2.0 * radius; 2], Some(Hollow::Pipe(wall)))
+            }
+            (Some("BOX"), &[a, b, wall, ref more @ ..])
+                if more.iter().all(|m| (m - wall).abs() <= 1e-9 * wall)
+                    && 2.0 * wall < a.min(b) =>
+            {
+                ([a, b], Some(Hollow::Box(wall)))
+            }
+            _ => {
+                return Err(card.fault(
+                    "sections are RECT (two sizes), PIPE (outer radius, wall) and BOX (two sizes, walls of one thickness)",
+                ));
+            }
+        };
+        let section = Section {
+            material: self.named_material(card, &card.need("MATERIAL")?)?,
+            orientation: None,
+            thickness: size[0],
+            profile: Profile::Beam { first, size, hollow },
+        };
+        self.assign(card, &section, |kind| match kind {
+            Kind::Thin(Thin::Beam { shape, .. }) => {
+                hollow.is_none() || shape == Shape::Hex20Reduced
+            }
+            _ => false,
+        })
     }
 }
 
@@ -207,25 +357,49 @@ pub(super) fn all_numbers(card: &Card<'_>) -> Result<Vec<f64>, Fault> {
     Ok(all)
 }
 
-/// The numbers, without the temperature at which they hold where that follows.
-fn counted<'a>(card: &Card<'_>, numbers: &'a [f64], counts: &[usize]) -> Result<&'a [f64], Fault> {
-    let fits = |&&n: &&usize| numbers.len() == n || numbers.len() == n + 1;
-    match counts.iter().find(fits) {
-        Some(&n) => Ok(&numbers[..n]),
-        None => Err(card.fault(format!(
-            "*{}: {} numbers, not {counts:?}; tables over temperature are not supported",
+/// Rows of N numbers by temperature.
+fn table<const N: usize>(card: &Card<'_>, numbers: &[f64]) -> Result<Table<N>, Fault> {
+    Table::of(numbers).ok_or_else(|| {
+        card.fault(format!(
+            "*{}: {} numbers, where {N} by row are needed, each row with its temperature, ascending",
             card.name,
             numbers.len()
-        ))),
+        ))
+    })
+}
+
+/// One constant for all axes, or one for each.
+fn along_axes(card: &Card<'_>, kind: &str, numbers: &[f64]) -> Result<Table<3>, Fault> {
+    match kind {
+        "" | "ISO" | "ISOTROPIC" => table::<1>(card, numbers)?.map(|&[a]| Ok([a; 3])),
+        "ORTHO" | "ORTHOTROPIC" => table::<3>(card, numbers),
+        other => {
+            let other = quote(other);
+            Err(card.fault(format!("*{}, TYPE={other}: ISO and ORTHO are supported", card.name)))
+        }
     }
 }
 
 /// Hooke's law along the axes of a material.
-fn elastic(card: &Card<'_>, kind: &str, numbers: &[f64]) -> Result<Tangent, Fault> {
-    let count = match kind {
-        "" | "ISO" | "ISOTROPIC" => 2,
-        "ORTHO" | "ORTHOTROPIC" | "ENGINEERING CONSTANTS" | "ENGINEERINGCONSTANTS" => 9,
-        "ANISO" | "ANISOTROPIC" => 21,
+fn elastic(card: &Card<'_>, kind: &str, numbers: &[f64], unit: f64) -> Result<Elastic, Fault> {
+    let law = match kind {
+        "" | "ISO" | "ISOTROPIC" => {
+            let in_range = |&[young, poisson]: &[f64; 2]| {
+                if young > 0.0 && poisson > -1.0 && poisson < 0.5 {
+                    return Ok([unit * young, poisson]);
+                }
+                Err(card.fault(
+                    "Young's modulus must be above 0 and Poisson's ratio above −1 and below 0.5",
+                ))
+            };
+            Elastic::Isotropic(table::<2>(card, numbers)?.map(in_range)?)
+        }
+        "ORTHO" | "ORTHOTROPIC" => Elastic::Orthotropic(table::<9>(card, numbers)?.scaled(unit)),
+        "ENGINEERING CONSTANTS" | "ENGINEERINGCONSTANTS" => {
+            let constants = table::<9>(card, numbers)?.map(|row| engineering(card, row))?;
+            Elastic::Orthotropic(constants.scaled(unit))
+        }
+        "ANISO" | "ANISOTROPIC" => Elastic::Anisotropic(table::<21>(card, numbers)?.scaled(unit)),
         other => {
             let other = quote(other);
             return Err(card.fault(format!(
@@ -233,49 +407,14 @@ fn elastic(card: &Card<'_>, kind: &str, numbers: &[f64]) -> Result<Tangent, Faul
             )));
         }
     };
-    let n = counted(card, numbers, &[count])?;
-    let law = match count {
-        2 => {
-            if !(n[0] > 0.0 && n[1] > -1.0 && n[1] < 0.5) {
-                return Err(card.fault(
-                    "Young's modulus must be above 0 and Poisson's ratio above −1 and below 0.5",
-                ));
-            }
-            tensor::stiffness(n[0], n[1])
-        }
-        9 if kind.starts_with("ORTHO") => orthotropic(n),
-        9 => orthotropic(&engineering(card, n)?),
-        _ => anisotropic(n),
-    };
-    let positive = nalgebra::Matrix6::from_fn(|i, j| law[i][j]).cholesky().is_some();
-    positive.then_some(law).ok_or_else(|| card.fault("*ELASTIC: this law is not positive definite"))
+    let is_positive =
+        |law: [[f64; 6]; 6]| nalgebra::Matrix6::from_fn(|i, j| law[i][j]).cholesky().is_some();
+    let all = law.all().into_iter().all(is_positive);
+    all.then_some(law).ok_or_else(|| card.fault("*ELASTIC: this law is not positive definite"))
 }
 
-/// 1111, 1122, 2222, 1133, 2233, 3333, 1212, 1313, 2323.
-fn orthotropic(n: &[f64]) -> Tangent {
-    let mut law = [[0.0; 6]; 6];
-    for (value, (i, j)) in n.iter().zip([(0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2)]) {
-        (law[i][j], law[j][i]) = (*value, *value);
-    }
-    (law[3][3], law[5][5], law[4][4]) = (n[6], n[7], n[8]);
-    law
-}
-
-/// The upper triangle, column by column, in Abaqus' order.
-fn anisotropic(n: &[f64]) -> Tangent {
-    let mut law = [[0.0; 6]; 6];
-    let mut values = n.iter();
-    for (column, &b) in ORDER.iter().enumerate() {
-        for &a in &ORDER[..=column] {
-            let value = values.next().copied().unwrap_or(0.0);
-            (law[a][b], law[b][a]) = (value, value);
-        }
-    }
-    law
-}
-
-/// E₁, E₂, E₃, ν₁₂, ν₁₃, ν₂₃, G₁₂, G₁₃, G₂₃ to the constants of [`orthotropic`].
-fn engineering(card: &Card<'_>, n: &[f64]) -> Result<[f64; 9], Fault> {
+/// E₁, E₂, E₃, ν₁₂, ν₁₃, ν₂₃, G₁₂, G₁₃, G₂₃ to the constants of [`Elastic::Orthotropic`].
+fn engineering(card: &Card<'_>, n: &[f64; 9]) -> Result<[f64; 9], Fault> {
     let [e1, e2, e3] = [n[0], n[1], n[2]];
     let compliance = Matrix3::new(
         1.0 / e1,

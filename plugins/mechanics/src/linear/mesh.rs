@@ -6,9 +6,11 @@ use glam::DVec3;
 
 use super::{
     flat::{Flat, Plane, Sides, thicken},
+    link::Link,
     model::Cell,
     read::{Kind, Raw, Reader, Section, Surface, plain},
     shape::Shape,
+    thin::Thin,
 };
 use crate::read::{
     Fault, LabelMap,
@@ -23,6 +25,7 @@ const MAX_COUNT: usize = 5_000_000;
 pub(super) fn kind(name: &str) -> Option<Kind> {
     let solid = match name {
         "C3D8" => Some(Shape::Hex8),
+        "C3D8I" => Some(Shape::Hex8Bubbles),
         "C3D20" => Some(Shape::Hex20),
         "C3D20R" => Some(Shape::Hex20Reduced),
         "C3D4" => Some(Shape::Tet4),
@@ -33,6 +36,12 @@ pub(super) fn kind(name: &str) -> Option<Kind> {
     };
     if let Some(shape) = solid {
         return Some(Kind::Solid(shape));
+    }
+    if let Some(link) = Link::of(name) {
+        return Some(Kind::Link(link));
+    }
+    if let Some(thin) = Thin::of(name) {
+        return Some(Kind::Thin(thin));
     }
     let (family, nodes) = name.split_at_checked(3)?;
     let plane = match family {
@@ -57,6 +66,8 @@ impl Kind {
         match self {
             Self::Solid(shape) => shape.nodes(),
             Self::Flat(flat) => flat.nodes(),
+            Self::Link(link) => link.nodes(),
+            Self::Thin(thin) => thin.nodes(),
         }
     }
 
@@ -70,6 +81,7 @@ impl Kind {
             Self::Flat(flat) => {
                 (1..=flat.corners).contains(&usize::from(number)).then_some(number + 1)
             }
+            Self::Link(_) | Self::Thin(_) => None,
         }
     }
 }
@@ -166,7 +178,7 @@ impl Reader {
         }
         let label = label(number).map_err(|e| row.fault(e))?;
         let nodes = nodes.iter().map(|n| self.node(n, row)).collect::<Result<Vec<_>, _>>()?;
-        Ok(Raw { label, kind, nodes, section: None, line: row.line })
+        Ok(Raw { label, kind, nodes, section: None, cell: None, line: row.line })
     }
 
     fn node_set(&mut self, card: &Card<'_>) -> Result<(), Fault> {
@@ -251,29 +263,62 @@ impl Reader {
         if self.raw.is_empty() {
             return Err(Fault::whole("no elements: a deck needs *NODE and *ELEMENT"));
         }
+        let bare = |r: &&Raw| !matches!(r.kind, Kind::Link(_)) && r.section.is_none();
+        if let Some(raw) = self.raw.iter().find(bare) {
+            let why = format!("element {} has no section", raw.label);
+            return Err(Fault::at(raw.line, why));
+        }
+        self.ring()?;
         let mut sides = Sides::new();
-        for raw in &self.raw {
-            let Some(section) = raw.section else {
-                let why = format!("element {} has no *SOLID SECTION", raw.label);
-                return Err(Fault::at(raw.line, why));
-            };
-            if !self.elastic.contains(&section.material) {
-                let name = &self.deck.materials[section.material as usize].name;
-                return Err(Fault::at(raw.line, format!("material {name} has no *ELASTIC")));
-            }
-            let (shape, nodes) = match raw.kind {
-                Kind::Solid(shape) => (shape, raw.nodes.clone()),
+        for i in 0..self.raw.len() {
+            let raw = &self.raw[i];
+            let Some(section) = &raw.section else { continue };
+            let cell = match raw.kind {
+                Kind::Link(_) => continue,
+                Kind::Thin(thin) => self.thickened(raw, thin, section),
+                Kind::Solid(shape) => whole(raw, shape, raw.nodes.clone(), section),
                 Kind::Flat(flat) => {
-                    let thickness = section.thickness;
                     let deck = &mut self.deck;
-                    (flat.shape, thicken(deck, flat, &raw.nodes, thickness, &mut sides))
+                    let nodes = thicken(deck, flat, &raw.nodes, section.thickness, &mut sides);
+                    whole(raw, flat.shape, nodes, section)
                 }
             };
-            let Section { material, orientation, .. } = section;
-            self.deck.cells.push(Cell { label: raw.label, shape, nodes, material, orientation });
+            self.raw[i].cell = Some(self.deck.cells.len() as u32);
+            self.deck.cells.push(cell);
         }
         self.deck.cold = vec![0.0; self.deck.nodes.len()];
         Ok(())
+    }
+
+    /// Every spring and coupling is described.
+    pub(super) fn unlinked(&self) -> Result<(), Fault> {
+        let open = |(i, raw): (usize, &Raw)| {
+            let open = matches!(raw.kind, Kind::Link(_)) && !self.sprung.contains(&(i as u32));
+            open.then(|| {
+                let why = "has no *SPRING or *DISTRIBUTING COUPLING";
+                Fault::at(raw.line, format!("element {} {why}", raw.label))
+            })
+        };
+        self.raw.iter().enumerate().find_map(open).map_or(Ok(()), Err)
+    }
+
+    /// Solids of an element or a set.
+    pub(super) fn some_cells(&self, word: &str, row: Row<'_>) -> Result<Vec<u32>, Fault> {
+        let elements = self.some_elements(word, row)?;
+        Ok(elements.into_iter().filter_map(|e| self.raw[e as usize].cell).collect())
+    }
+}
+
+/// A cell of one material, integrated as its shape is.
+fn whole(raw: &Raw, shape: Shape, nodes: Vec<u32>, section: &Section) -> Cell {
+    Cell {
+        label: raw.label,
+        shape,
+        nodes,
+        material: section.material,
+        orientation: section.orientation,
+        points: Vec::new(),
+        layers: Vec::new(),
     }
 }
 

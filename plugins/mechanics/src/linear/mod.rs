@@ -7,29 +7,37 @@
 //!
 //! | subject | what |
 //! |---|---|
-//! | elements | C3D4, C3D6, C3D8, C3D10, C3D15, C3D20, C3D20R; CPS, CPE and CAX of 3, 4, 6 and 8 nodes and 8R, as layers of solids |
-//! | materials | `*ELASTIC` (ISO, ORTHO, ANISO, ENGINEERING CONSTANTS), `*EXPANSION` (ISO, ORTHO), `*DENSITY`, `*ORIENTATION` |
-//! | constraints | `*BOUNDARY`, `*EQUATION`, `*TRANSFORM`, `*TIE` |
-//! | loads | `*CLOAD`, `*DLOAD` (P, GRAV, CENTRIF), `*DSLOAD` (P), `*TEMPERATURE`, `*INITIAL CONDITIONS` (TEMPERATURE, STRESS, PLASTIC STRAIN), `*AMPLITUDE` |
-//! | steps | `*STATIC` without `NLGEOM`; `OP=MOD` and `OP=NEW` |
+//! | elements | C3D4, C3D6, C3D8, C3D8I, C3D10, C3D15, C3D20, C3D20R; CPS, CPE and CAX of 3, 4, 6 and 8 nodes and 8R, as layers of solids; S3, S4, S6, S8, S8R and B31, B32, B32R where they meet smoothly; SPRINGA, SPRING1, SPRING2 |
+//! | materials | `*ELASTIC` (ISO, ORTHO, ANISO, ENGINEERING CONSTANTS), `*EXPANSION`, `*CONDUCTIVITY` (ISO, ORTHO), `*DENSITY`, `*SPECIFIC HEAT`, all by temperature; `*ORIENTATION` |
+//! | constraints | `*BOUNDARY`, `*EQUATION`, `*TRANSFORM`, `*TIE`, `*RIGID BODY`, `*MPC` (MEANROT), `*DISTRIBUTING COUPLING`, `*PRE-TENSION SECTION` |
+//! | loads | `*CLOAD`, `*DLOAD` (P, GRAV, CENTRIF), `*DSLOAD` (P), `*TEMPERATURE`, `*INITIAL CONDITIONS` (TEMPERATURE, STRESS, PLASTIC STRAIN), `*AMPLITUDE`; `*CFLUX`, `*DFLUX`, `*FILM`, `*RADIATE` |
+//! | steps | `*STATIC`, `*FREQUENCY`, `*BUCKLE`, `*HEAT TRANSFER` (steady, in time, FREQUENCY) without `NLGEOM`; `OP=MOD` and `OP=NEW` |
 //!
 //! Everything else is refused in one line that names all of it.
 
 mod constraint;
 mod element;
 mod flat;
+mod heat;
+mod law;
+mod link;
 mod matter;
 mod mesh;
 mod model;
+mod modes;
 mod read;
 mod shape;
 mod solve;
 mod steps;
+mod thin;
 mod tie;
+mod warm;
 
 pub use model::Deck;
 pub use read::{concerns, parse};
 pub use solve::{LinearError, Solved};
 
+#[cfg(test)]
+mod checks;
 #[cfg(test)]
 mod tests;

@@ -1,11 +1,15 @@
 //! What a deck says, in SI and by positions.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use glam::DVec3;
 
-use super::{constraint::Equation, shape::Shape};
-use crate::tensor::{self, Frame, Tangent, Voigt};
+use super::{
+    constraint::Equation,
+    law::{Elastic, Expansion, Table},
+    shape::{Point, Shape},
+};
+use crate::tensor::{self, Frame, Voigt};
 
 /// A linear elastic model and its steps.
 #[derive(Debug, Clone, Default)]
@@ -17,12 +21,23 @@ pub struct Deck {
     pub(super) cells: Vec<Cell>,
     pub(super) materials: Vec<Material>,
     pub(super) orientations: Vec<Orientation>,
+    pub(super) springs: Vec<Spring>,
     /// What holds in every step: equations, ties, thickened elements.
     pub(super) equations: Vec<Equation>,
+    /// Nodes that thicken flat elements, and the node that each has its temperature from.
+    pub(super) twins: HashMap<u32, u32>,
+    /// Nodes whose displacement is given as the mean of others.
+    pub(super) means: HashMap<u32, Vec<(u32, f64)>>,
+    /// Nodes whose forces act on others, by their shares.
+    pub(super) shares: HashMap<u32, Vec<(u32, f64)>>,
+    /// What holds from a step on, counted from 1.
+    pub(super) later: Vec<(u32, Equation)>,
     /// Axes in which supports, forces and equations of a node are given.
     pub(super) turned: HashMap<u32, Frame>,
     /// Temperature of every node at which the body has no strain.
     pub(super) cold: Vec<f64>,
+    /// The temperature that radiation counts from.
+    pub(super) absolute_zero: f64,
     /// Stress before the first step, by element and point.
     pub(super) stress: HashMap<(u32, u32), Voigt>,
     pub(super) steps: Vec<Step>,
@@ -38,18 +53,32 @@ pub(super) struct Cell {
     pub(super) nodes: Vec<u32>,
     pub(super) material: u32,
     pub(super) orientation: Option<u32>,
+    /// Points of integration, where they are not those of its shape.
+    pub(super) points: Vec<Point>,
+    /// Material and axes at every point, where they differ.
+    pub(super) layers: Vec<(u32, Option<u32>)>,
 }
 
-/// A linear elastic material.
+/// A linear spring: its force is k times a sum of displacements, and acts on each by its factor.
 #[derive(Debug, Clone)]
+pub(super) struct Spring {
+    pub(super) terms: Vec<(u32, f64)>,
+    /// N/m.
+    pub(super) stiffness: f64,
+}
+
+/// What a material is; a step asks for what it needs.
+#[derive(Debug, Clone, Default)]
 pub(super) struct Material {
     pub(super) name: String,
-    /// Along its own axes, Pa.
-    pub(super) stiffness: Tangent,
-    /// Along its own axes, 1/K.
-    pub(super) expansion: [f64; 3],
+    pub(super) elastic: Option<Elastic>,
+    pub(super) expansion: Option<Expansion>,
     /// kg/m³.
-    pub(super) density: f64,
+    pub(super) density: Option<Table<1>>,
+    /// Along its own axes, W/(m·K).
+    pub(super) conductivity: Option<Table<3>>,
+    /// J/(kg·K).
+    pub(super) specific_heat: Option<Table<1>>,
 }
 
 /// The axes of a material.
@@ -107,19 +136,73 @@ impl Pull {
     }
 }
 
+/// What a step computes.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) enum Procedure {
+    /// Displacements and stresses.
+    #[default]
+    Static,
+    /// Temperatures.
+    Heat {
+        /// Those at which nothing changes any more.
+        steady: bool,
+        /// s.
+        first: f64,
+        /// s.
+        duration: f64,
+    },
+    /// The smallest eigenvalues, of motion or of heat.
+    Modes {
+        count: usize,
+        /// With the stresses of the step before.
+        stressed: bool,
+        heat: bool,
+    },
+    /// The smallest factors of the loads at which the structure buckles.
+    Buckling { count: usize },
+}
+
+/// A way of heating.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Heating {
+    /// W, into a node.
+    Node,
+    /// W/m³, in an element.
+    Volume,
+    /// W/m², into a face.
+    Face,
+    /// Through a film on a face: W/(m²·K), and the temperature beyond it.
+    Film,
+    /// By radiation from what is around a face: W/(m²·K⁴), and its temperature.
+    Radiation,
+}
+
+/// What is heated: how, which node or element, and which of its faces.
+pub(super) type Heated = (Heating, u32, u8);
+
 /// A step at its end.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Step {
     pub(super) name: String,
+    /// From 1.
+    pub(super) number: u32,
+    pub(super) procedure: Procedure,
     /// Components (in the node's own axes) and values, m.
     pub(super) held: BTreeMap<(u32, u8), f64>,
+    /// Components that stay where the step before has left them.
+    pub(super) kept: BTreeSet<(u32, u8)>,
     /// N.
     pub(super) forces: BTreeMap<(u32, u8), f64>,
     /// Pa, by element and face.
     pub(super) pressures: BTreeMap<(u32, u8), f64>,
     pub(super) pulls: Vec<(u32, Pull)>,
-    /// Of every node; empty: as at the beginning.
+    /// Of every node; empty: as at the beginning, or as the last heat step has left it.
     pub(super) warm: Vec<f64>,
+    /// Temperatures that a heat step holds.
+    pub(super) temperatures: BTreeMap<u32, f64>,
+    pub(super) heating: BTreeMap<Heated, [f64; 2]>,
+    /// Elements that are made of another material than their own.
+    pub(super) materials: BTreeMap<u32, u32>,
 }
 
 impl Deck {
@@ -132,6 +215,13 @@ impl Deck {
     /// Numbers of its elements.
     pub fn elements(&self) -> impl ExactSizeIterator<Item = u32> {
         self.cells.iter().map(|c| c.label)
+    }
+
+    /// Gives nodes that thicken flat elements the temperature of their own.
+    pub(super) fn spread(&self, temperatures: &mut [f64]) {
+        for (&twin, &node) in &self.twins {
+            temperatures[twin as usize] = temperatures[node as usize];
+        }
     }
 
     /// The unknowns of a component of a node in its own axes.

@@ -5,7 +5,14 @@ use std::{
     path::Path,
 };
 
-use super::{flat::Flat, model::Deck, shape::Shape, steps::State};
+use super::{
+    flat::Flat,
+    link::Link,
+    model::Deck,
+    shape::Shape,
+    steps::State,
+    thin::{Profile, Rings, Thin},
+};
 use crate::read::{
     Fault, LabelMap, ReadError, Units,
     abaqus::{
@@ -16,33 +23,14 @@ use crate::read::{
 };
 
 /// Cards that are read, without their spaces.
-const KNOWN: [&str; 25] = [
-    "NODE",
-    "ELEMENT",
-    "NSET",
-    "ELSET",
-    "SURFACE",
-    "MATERIAL",
-    "ELASTIC",
-    "DENSITY",
-    "EXPANSION",
-    "CONDUCTIVITY",
-    "SPECIFICHEAT",
-    "SOLIDSECTION",
-    "ORIENTATION",
-    "AMPLITUDE",
-    "TRANSFORM",
-    "EQUATION",
-    "TIE",
-    "INITIALCONDITIONS",
-    "BOUNDARY",
-    "STEP",
-    "STATIC",
-    "CLOAD",
-    "DLOAD",
-    "DSLOAD",
-    "TEMPERATURE",
-];
+const KNOWN: &str = "NODE ELEMENT NSET ELSET SURFACE MATERIAL ELASTIC DENSITY EXPANSION \
+    CONDUCTIVITY SPECIFICHEAT SOLIDSECTION SHELLSECTION BEAMSECTION \
+    BEAMGENERALSECTION NODALTHICKNESS MEMBRANE ORIENTATION AMPLITUDE TRANSFORM EQUATION TIE \
+    SPRING MPC RIGIDBODY DISTRIBUTINGCOUPLING PRE-TENSIONSECTION PHYSICALCONSTANTS \
+    INITIALCONDITIONS BOUNDARY STEP STATIC FREQUENCY BUCKLE HEATTRANSFER CLOAD DLOAD DSLOAD \
+    TEMPERATURE CFLUX DFLUX FILM RADIATE CHANGESOLIDSECTION ENDSTEP";
+/// Cards that only concern what is printed, beside those of every deck.
+const OUTPUT: [&str; 2] = ["FACEPRINT", "TIMEPOINTS"];
 /// Cards that only say how contact would behave: without contact they say nothing.
 const CONTACT: [&str; 3] = ["SURFACEINTERACTION", "SURFACEBEHAVIOR", "FRICTION"];
 /// Faults that one line names.
@@ -85,8 +73,19 @@ fn deck(bytes: &[u8], units: Units) -> Result<Deck, Fault> {
         });
         reader.fail()?;
     }
+    for card in &cards {
+        let read = reader.cut(card);
+        reader.keep(read);
+    }
     let made = reader.make();
     reader.keep(made);
+    reader.fail()?;
+    for card in &cards {
+        let read = reader.linked(card);
+        reader.keep(read);
+    }
+    let unlinked = reader.unlinked();
+    reader.keep(unlinked);
     reader.fail()?;
     let mut state = State::default();
     for card in &cards {
@@ -96,14 +95,14 @@ fn deck(bytes: &[u8], units: Units) -> Result<Deck, Fault> {
     let ended = state.ended();
     reader.keep(ended);
     // Ties last: what is bound otherwise stays as it is.
-    for pass in [Reader::equation, Reader::tied] {
+    for pass in [Reader::equation, Reader::tie] {
         cards.iter().for_each(|card| {
             let read = pass(&mut reader, card);
             reader.keep(read);
         });
     }
     reader.fail()?;
-    Ok(reader.deck)
+    Ok(reader.finished())
 }
 
 /// What an element of the file is.
@@ -111,6 +110,8 @@ fn deck(bytes: &[u8], units: Units) -> Result<Deck, Fault> {
 pub(super) enum Kind {
     Solid(Shape),
     Flat(Flat),
+    Link(Link),
+    Thin(Thin),
 }
 
 /// An element as the file has it.
@@ -120,15 +121,38 @@ pub(super) struct Raw {
     pub(super) kind: Kind,
     pub(super) nodes: Vec<u32>,
     pub(super) section: Option<Section>,
+    /// The solid that it has become.
+    pub(super) cell: Option<u32>,
     pub(super) line: u32,
 }
 
+impl Raw {
+    /// Nodes of a face of a solid, or of a side of a plane.
+    pub(super) fn side(&self, face: u8) -> Vec<u32> {
+        let face = usize::from(face);
+        match self.kind {
+            Kind::Solid(shape) => {
+                shape.faces().nth(face).into_iter().flatten().map(|&i| self.nodes[i]).collect()
+            }
+            Kind::Flat(flat) => {
+                let (first, n) = (face.saturating_sub(2), flat.corners);
+                let mut side = vec![self.nodes[first], self.nodes[(first + 1) % n]];
+                side.extend(self.nodes.get(n + first));
+                side
+            }
+            Kind::Link(_) | Kind::Thin(_) => Vec::new(),
+        }
+    }
+}
+
 /// What an element is made of.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(super) struct Section {
     pub(super) material: u32,
     pub(super) orientation: Option<u32>,
+    /// Of planes and shells, m.
     pub(super) thickness: f64,
+    pub(super) profile: Profile,
 }
 
 /// What a surface is made of.
@@ -151,8 +175,15 @@ pub(super) struct Reader {
     pub(super) materials: HashMap<String, u32>,
     pub(super) orientations: HashMap<String, u32>,
     pub(super) amplitudes: HashMap<String, crate::read::Amplitude>,
-    /// Materials that have an elastic law.
-    pub(super) elastic: BTreeSet<u32>,
+    /// Springs and couplings that are described.
+    pub(super) sprung: BTreeSet<u32>,
+    /// Nodes whose first three components are the angles of another.
+    pub(super) turning: HashMap<u32, u32>,
+    /// What nodes of beams and shells become.
+    pub(super) rings: Rings,
+    /// W/(m²·K⁴).
+    pub(super) boltzmann: Option<f64>,
+    pub(super) tied: bool,
     pub(super) in_material: bool,
     faults: Vec<Fault>,
 }
@@ -171,7 +202,11 @@ impl Reader {
             materials: HashMap::new(),
             orientations: HashMap::new(),
             amplitudes: HashMap::new(),
-            elastic: BTreeSet::new(),
+            sprung: BTreeSet::new(),
+            turning: HashMap::new(),
+            rings: HashMap::new(),
+            boltzmann: None,
+            tied: false,
             in_material: false,
             faults: Vec::new(),
         }
@@ -179,6 +214,22 @@ impl Reader {
 
     fn keep(&mut self, read: Result<(), Fault>) {
         self.faults.extend(read.err());
+    }
+
+    /// What was made on the way has temperatures too.
+    fn finished(mut self) -> Deck {
+        let count = self.deck.nodes.len();
+        let mut cold = std::mem::take(&mut self.deck.cold);
+        cold.resize(count, 0.0);
+        self.deck.spread(&mut cold);
+        self.deck.cold = cold;
+        let mut steps = std::mem::take(&mut self.deck.steps);
+        for step in steps.iter_mut().filter(|s| !s.warm.is_empty()) {
+            step.warm.resize(count, 0.0);
+            self.deck.spread(&mut step.warm);
+        }
+        self.deck.steps = steps;
+        self.deck
     }
 
     /// All faults so far as one.
@@ -213,8 +264,9 @@ impl Reader {
                 format!("elements of type {} are not computed", quote(&kind))
             } else {
                 let idle = CONTACT.contains(&name.as_str()) && !has_contact;
-                let known = KNOWN.contains(&name.as_str()) || name == "ENDSTEP";
-                if known || idle || abaqus::is_output(card) || !seen.insert(name) {
+                let known = KNOWN.split_ascii_whitespace().any(|known| known == name);
+                let idle = idle || OUTPUT.contains(&name.as_str()) || abaqus::is_output(card);
+                if known || idle || !seen.insert(name) {
                     continue;
                 }
                 format!("*{} is not computed", quote(&card.name).trim_matches('"'))
@@ -222,7 +274,8 @@ impl Reader {
             self.faults.push(card.fault(what));
         }
         if let Some(last) = self.faults.last_mut() {
-            last.reason += "; decks of linear elastic solids under static loads are";
+            last.reason +=
+                "; static loads, frequencies, buckling and heat of linear elastic structures are";
         }
     }
 

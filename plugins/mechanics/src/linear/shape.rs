@@ -8,6 +8,8 @@ use std::ops::{Add, Mul, Sub};
 pub(super) enum Shape {
     /// C3D8.
     Hex8,
+    /// C3D8I: as [`Shape::Hex8`] with bubbles that let it bend.
+    Hex8Bubbles,
     /// C3D20.
     Hex20,
     /// C3D20R: as [`Shape::Hex20`] with eight points.
@@ -141,7 +143,8 @@ const TET_EDGES: [[usize; 2]; 6] = [[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 
 const TRIANGLE_EDGES: [[usize; 2]; 3] = [[0, 1], [1, 2], [2, 0]];
 
 /// Gauss' points and weights on −1 … 1.
-const GAUSS_2: [(f64, f64); 2] = [(-0.577_350_269_189_625_8, 1.0), (0.577_350_269_189_625_8, 1.0)];
+pub(super) const GAUSS_2: [(f64, f64); 2] =
+    [(-0.577_350_269_189_625_8, 1.0), (0.577_350_269_189_625_8, 1.0)];
 const GAUSS_3: [(f64, f64); 3] =
     [(-0.774_596_669_241_483_4, 5.0 / 9.0), (0.0, 8.0 / 9.0), (0.774_596_669_241_483_4, 5.0 / 9.0)];
 /// Three points of a triangle of area ½.
@@ -156,7 +159,7 @@ impl Shape {
     /// How many nodes it has.
     pub(super) fn nodes(self) -> usize {
         match self {
-            Self::Hex8 => 8,
+            Self::Hex8 | Self::Hex8Bubbles => 8,
             Self::Hex20 | Self::Hex20Reduced => 20,
             Self::Tet4 => 4,
             Self::Tet10 => 10,
@@ -169,7 +172,9 @@ impl Shape {
     pub(super) fn functions(self, at: [f64; 3]) -> Vec<Jet> {
         let x = coordinates(at);
         match self {
-            Self::Hex8 => BRICK[..8].iter().map(|n| corner(x, *n) * 0.125).collect(),
+            Self::Hex8 | Self::Hex8Bubbles => {
+                BRICK[..8].iter().map(|n| corner(x, *n) * 0.125).collect()
+            }
             Self::Hex20 | Self::Hex20Reduced => BRICK.iter().map(|n| serendipity(x, *n)).collect(),
             Self::Tet4 | Self::Tet10 => {
                 let l = [Jet::of(1.0) - x[0] - x[1] - x[2], x[0], x[1], x[2]];
@@ -182,7 +187,7 @@ impl Shape {
     /// Points of integration over its volume, in the order in which stresses are given.
     pub(super) fn points(self) -> Vec<Point> {
         match self {
-            Self::Hex8 | Self::Hex20Reduced => cube(&GAUSS_2),
+            Self::Hex8 | Self::Hex8Bubbles | Self::Hex20Reduced => cube(&GAUSS_2),
             Self::Hex20 => cube(&GAUSS_3),
             Self::Tet4 => vec![([0.25; 3], 1.0 / 6.0)],
             Self::Tet10 => {
@@ -196,10 +201,23 @@ impl Shape {
         }
     }
 
+    /// Points for masses and stored heat: they integrate the square of its functions where it is
+    /// not distorted, but for C3D20R, which CalculiX weighs at the points of its stiffness.
+    pub(super) fn fine_points(self) -> Vec<Point> {
+        match self {
+            Self::Hex8 | Self::Hex8Bubbles | Self::Hex20Reduced => cube(&GAUSS_2),
+            Self::Hex20 => cube(&GAUSS_3),
+            Self::Tet4 => Self::Tet10.points(),
+            Self::Tet10 => keast(),
+            Self::Wedge6 => prism(&TRIANGLE_3, &GAUSS_2),
+            Self::Wedge15 => prism(&radon(), &GAUSS_3),
+        }
+    }
+
     /// Nodes of each of its faces, counterclockwise from outside, corners first.
     pub(super) fn faces(self) -> impl ExactSizeIterator<Item = &'static [usize]> {
         let (all, quadratic): (&'static [&'static [usize]], bool) = match self {
-            Self::Hex8 => (&BRICK_FACES, false),
+            Self::Hex8 | Self::Hex8Bubbles => (&BRICK_FACES, false),
             Self::Hex20 | Self::Hex20Reduced => (&BRICK_FACES, true),
             Self::Tet4 => (&TET_FACES, false),
             Self::Tet10 => (&TET_FACES, true),
@@ -235,6 +253,22 @@ pub(super) fn face_functions(nodes: usize, at: [f64; 2]) -> Vec<Jet> {
         4 => BRICK[..4].iter().map(|n| flat_corner(x, *n) * 0.25).collect(),
         _ => BRICK[..4].iter().chain(&BRICK[8..12]).map(|n| flat_serendipity(x, *n)).collect(),
     }
+}
+
+/// Natural coordinates of the nodes of a face of 3, 4, 6 or 8 nodes.
+pub(super) fn face_places(nodes: usize) -> Vec<[f64; 2]> {
+    let corners = if nodes.is_multiple_of(3) {
+        vec![[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]
+    } else {
+        BRICK[..4].iter().map(|n| [n[0], n[1]]).collect()
+    };
+    let n = corners.len();
+    let middle = |i: usize| {
+        let (a, b) = (corners[i], corners[(i + 1) % n]);
+        [0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1])]
+    };
+    let middles: Vec<[f64; 2]> = (0..n).map(middle).collect();
+    corners.into_iter().chain(middles).take(nodes).collect()
 }
 
 /// 1 + aξ where the node lies at a; 1 − ξ² in the middle of an edge.
@@ -304,6 +338,36 @@ fn cube(g: &[(f64, f64)]) -> Vec<Point> {
     points
 }
 
+/// Fifteen points of a tetrahedron, exact to the fifth degree (Keast 1986).
+fn keast() -> Vec<Point> {
+    let root = 15f64.sqrt();
+    let at = |l: [f64; 4], weight: f64| ([l[1], l[2], l[3]], weight / 6.0);
+    let mut points = vec![at([0.25; 4], 16.0 / 135.0)];
+    for sign in [-1.0, 1.0] {
+        let near = (7.0 + sign * root) / 34.0;
+        let weight = (2665.0 - sign * 14.0 * root) / 37800.0;
+        let corner = |k| std::array::from_fn(|i| if i == k { 1.0 - 3.0 * near } else { near });
+        points.extend((0..4).map(|k| at(corner(k), weight)));
+    }
+    let (near, far) = ((5.0 - root) / 20.0, (5.0 + root) / 20.0);
+    let edge = |e: &[usize; 2]| std::array::from_fn(|i| if e.contains(&i) { far } else { near });
+    points.extend(TET_EDGES.iter().map(|e| at(edge(e), 10.0 / 189.0)));
+    points
+}
+
+/// Seven points of a triangle of area ½, exact to the fifth degree (Radon 1948).
+fn radon() -> Vec<([f64; 2], f64)> {
+    let root = 15f64.sqrt();
+    let mut points = vec![([1.0 / 3.0; 2], 9.0 / 80.0)];
+    for sign in [-1.0, 1.0] {
+        let near = (6.0 + sign * root) / 21.0;
+        let weight = (155.0 + sign * root) / 2400.0;
+        let far = 1.0 - 2.0 * near;
+        points.extend([[near, near], [far, near], [near, far]].map(|at| (at, weight)));
+    }
+    points
+}
+
 fn prism(triangle: &[([f64; 2], f64)], g: &[(f64, f64)]) -> Vec<Point> {
     let layer = |&(c, w): &(f64, f64)| triangle.iter().map(move |&([a, b], v)| ([a, b, c], v * w));
     g.iter().flat_map(layer).collect()
@@ -313,8 +377,9 @@ fn prism(triangle: &[([f64; 2], f64)], g: &[(f64, f64)]) -> Vec<Point> {
 mod tests {
     use super::*;
 
-    const ALL: [Shape; 7] = [
+    const ALL: [Shape; 8] = [
         Shape::Hex8,
+        Shape::Hex8Bubbles,
         Shape::Hex20,
         Shape::Hex20Reduced,
         Shape::Tet4,
@@ -354,10 +419,27 @@ mod tests {
                 _ => 8.0,
             };
             assert!((volume - expected).abs() < 1e-14, "{shape:?}");
+            // ∫ N Nᵀ of the square of a function, by points of another rule: x⁴ is of its degree.
+            let is_fine = shape.nodes() > 8 && shape != Shape::Hex20Reduced;
+            let degree = if is_fine { 4 } else { 2 };
+            let power: f64 = shape.fine_points().iter().map(|p| p.1 * p.0[0].powi(degree)).sum();
+            let exact = match (shape, degree) {
+                (Shape::Tet4, _) => 2.0 / 120.0,
+                (Shape::Tet10, _) => 24.0 / 5040.0,
+                (Shape::Wedge6, _) => 4.0 / 24.0,
+                (Shape::Wedge15, _) => 48.0 / 720.0,
+                (_, 2) => 8.0 / 3.0,
+                _ => 8.0 / 5.0,
+            };
+            assert!((power - exact).abs() < 1e-14, "{shape:?}: {power}");
             for face in shape.faces() {
                 let area: f64 = shape.face_points(face.len()).iter().map(|p| p.1).sum();
                 let triangle = face.len() % 3 == 0;
                 assert!((area - if triangle { 0.5 } else { 4.0 }).abs() < 1e-14);
+                for (i, at) in face_places(face.len()).into_iter().enumerate() {
+                    let own = face_functions(face.len(), at);
+                    assert!((own[i].value - 1.0).abs() < 1e-14);
+                }
                 let sum: f64 = face_functions(face.len(), [0.2, 0.3]).iter().map(|j| j.value).sum();
                 assert!((sum - 1.0).abs() < 1e-14);
             }

@@ -7,8 +7,10 @@ use intrados_stage::{Cancelled, Job};
 
 use super::{
     constraint::{Bound, Equation, Sum},
-    element::{Element, Folded},
-    model::{Cell, Deck, Step},
+    element::{Element, Folded, Warmth},
+    heat,
+    model::{Deck, Procedure, Pull, Step},
+    modes,
 };
 use crate::{
     sparse::{BlockMatrix, Connectivity, Constraints, Method, Pattern, Place, SolveError, solve},
@@ -24,6 +26,11 @@ pub struct Solved {
     pub displacements: Vec<DVec3>,
     /// Pa at every point of every element.
     pub stresses: Vec<Vec<Voigt>>,
+    /// Of the nodes that the deck names, where the step is one of heat.
+    pub temperatures: Vec<f64>,
+    /// The smallest, ascending: squares of angular frequencies, 1/s²; rates at which temperatures
+    /// decay, 1/s; factors at which loads buckle.
+    pub eigenvalues: Vec<f64>,
     /// Unknowns that were solved for.
     pub unknowns: usize,
 }
@@ -68,6 +75,30 @@ pub enum LinearError {
         /// Name of the step.
         step: String,
     },
+    /// Temperatures that nothing ties to anything.
+    #[error(
+        "{step}: a part of the model has no temperature to settle at: hold one by *BOUNDARY, or give it a *FILM"
+    )]
+    Adrift {
+        /// Name of the step.
+        step: String,
+    },
+    /// Modes of something that its stresses make unstable.
+    #[error(
+        "{step}: the stresses before it are beyond buckling: there are no vibrations about them"
+    )]
+    Unstable {
+        /// Name of the step.
+        step: String,
+    },
+    /// Temperatures or modes that do not settle.
+    #[error("{step}: {what} do not converge")]
+    NotConverged {
+        /// Name of the step.
+        step: String,
+        /// What.
+        what: &'static str,
+    },
     /// The equations could not be solved.
     #[error(transparent)]
     Solve(#[from] SolveError),
@@ -78,7 +109,17 @@ pub enum LinearError {
 
 /// ‖f − K u‖ / ‖f‖ of a solution: slender solids of millions of entries lose six digits of sixteen,
 /// and a part that nothing holds all of them.
-const TOLERANCE: f64 = 1e-7;
+const TOLERANCE: f64 = 1e-6;
+
+/// What the steps before leave to the next.
+#[derive(Default)]
+pub(super) struct Past {
+    /// Of every unknown; empty before the first step.
+    displacements: Vec<f64>,
+    stresses: Vec<Vec<Voigt>>,
+    /// Of every node.
+    pub(super) temperatures: Vec<f64>,
+}
 
 impl Deck {
     /// Computes every step.
@@ -86,22 +127,48 @@ impl Deck {
     /// # Errors
     /// [`LinearError`].
     pub fn solve(&self, job: &Job) -> Result<Vec<Solved>, LinearError> {
+        let mut past = Past { temperatures: self.cold.clone(), ..Past::default() };
+        let share = self.steps.len() as f64;
         let solved = self.steps.iter().enumerate().map(|(i, step)| {
             job.step(i, self.steps.len())?;
-            let share = self.steps.len() as f64;
-            System::new(self, step)?.solve(&job.part(i as f64 / share, (i + 1) as f64 / share))
+            self.step(step, &mut past, &job.part(i as f64 / share, (i + 1) as f64 / share))
         });
         solved.collect()
     }
 
+    fn step(&self, step: &Step, past: &mut Past, job: &Job) -> Result<Solved, LinearError> {
+        match step.procedure {
+            Procedure::Static => System::new(self, step, past)?.solve(past, job),
+            Procedure::Modes { count, heat: true, .. } => heat::modes(self, step, count, job),
+            Procedure::Modes { count, stressed, .. } => {
+                let system = System::new(self, step, past)?;
+                system.modes(count, if stressed { &past.stresses } else { &[] }, job)
+            }
+            Procedure::Buckling { count } => {
+                let system = System::new(self, step, past)?;
+                system.buckling(count, job)
+            }
+            Procedure::Heat { steady, first, duration } => {
+                let time = (!steady).then_some([first, duration]);
+                heat::solve(self, step, time, &mut past.temperatures, job)
+            }
+        }
+    }
+
     /// What is held in a step, as equations.
-    fn held(&self, step: &Step) -> Vec<Equation> {
-        let held = step.held.iter().map(|(&(node, component), &value)| Equation {
+    fn held(&self, step: &Step, past: &Past) -> Vec<Equation> {
+        let equation = |(node, component), value| Equation {
             terms: self.component(node, component),
             value,
             line: 0,
+        };
+        let held = step.held.iter().map(|(&at, &value)| equation(at, value));
+        let kept = step.kept.iter().map(|&(node, component)| {
+            let place = |&(u, f): &(u32, f64)| past.displacements.get(u as usize).map(|d| f * d);
+            let terms = self.component(node, component);
+            equation((node, component), terms.iter().filter_map(place).sum())
         });
-        held.collect()
+        held.chain(kept).collect()
     }
 }
 
@@ -109,45 +176,56 @@ impl Deck {
 struct System<'a> {
     deck: &'a Deck,
     step: &'a Step,
+    /// Temperature of every node.
+    warm: Vec<f64>,
     /// Of every unknown of every node.
     sums: Vec<Sum>,
     /// Number of each free unknown among those that are solved for.
     numbers: HashMap<u32, u32>,
     places: Vec<Place>,
+    /// Free unknowns of every element, then of every spring.
     elements: Connectivity,
 }
 
 impl<'a> System<'a> {
-    fn new(deck: &'a Deck, step: &'a Step) -> Result<Self, LinearError> {
-        let held = deck.held(step);
+    fn new(deck: &'a Deck, step: &'a Step, past: &Past) -> Result<Self, LinearError> {
+        let held = deck.held(step, past);
         // Supports first: equations then bind what is left.
-        let bound = Bound::new(held.iter().chain(&deck.equations))
+        let later = deck.later.iter().filter(|l| l.0 <= step.number).map(|l| &l.1);
+        let bound = Bound::new(held.iter().chain(&deck.equations).chain(later))
             .map_err(|e| LinearError::Contradiction { step: step.name.clone(), line: e.line })?;
         let sums: Vec<Sum> = (0..3 * deck.nodes.len() as u32).map(|u| bound.of(u)).collect();
+        let warm = if step.warm.is_empty() { &past.temperatures } else { &step.warm };
         let mut system = Self {
             deck,
             step,
+            warm: warm.clone(),
             sums,
             numbers: HashMap::new(),
             places: Vec::new(),
             elements: Connectivity::default(),
         };
-        for cell in &deck.cells {
-            let free = system.free(cell);
+        for e in 0..deck.cells.len() + deck.springs.len() {
+            let free = system.free(e);
             let numbered: Vec<u32> = free.into_iter().map(|u| system.number(u)).collect();
             system.elements.push(&numbered);
         }
         Ok(system)
     }
 
-    /// Unknowns of an element.
-    fn unknowns(cell: &Cell) -> impl Iterator<Item = u32> {
-        cell.nodes.iter().flat_map(|&n| (0..3).map(move |i| 3 * n + i))
+    /// Unknowns of an element or, after the elements, of a spring.
+    fn unknowns(&self, e: usize) -> Vec<u32> {
+        match self.deck.cells.get(e) {
+            Some(cell) => cell.nodes.iter().flat_map(|&n| (0..3).map(move |i| 3 * n + i)).collect(),
+            None => {
+                self.deck.springs[e - self.deck.cells.len()].terms.iter().map(|t| t.0).collect()
+            }
+        }
     }
 
     /// The free unknowns that an element moves with, ascending.
-    fn free(&self, cell: &Cell) -> Vec<u32> {
-        let sums = Self::unknowns(cell).map(|u| &self.sums[u as usize]);
+    fn free(&self, e: usize) -> Vec<u32> {
+        let sums = self.unknowns(e).into_iter().map(|u| &self.sums[u as usize]);
         let mut free: Vec<u32> = sums.flat_map(|s| s.terms.iter().map(|t| t.0)).collect();
         free.sort_unstable();
         free.dedup();
@@ -163,73 +241,79 @@ impl<'a> System<'a> {
         number
     }
 
-    /// Warmth of the nodes of an element.
-    fn warmth(&self, cell: &Cell) -> Vec<f64> {
-        let warm = |&n: &u32| {
-            self.step.warm.get(n as usize).map_or(0.0, |t| t - self.deck.cold[n as usize])
-        };
-        cell.nodes.iter().map(warm).collect()
+    /// Temperatures of the nodes of an element.
+    fn warmth(&self, e: usize) -> Warmth {
+        let of = |all: &[f64]| self.deck.cells[e].nodes.iter().map(|&n| all[n as usize]).collect();
+        Warmth { now: of(&self.warm), cold: of(&self.deck.cold) }
     }
 
-    fn initial(&self, cell: usize) -> impl Fn(usize) -> Voigt + '_ {
-        move |p| self.deck.stress.get(&(cell as u32, p as u32)).copied().unwrap_or(tensor::ZERO)
+    fn initial(&self, e: usize) -> impl Fn(usize) -> Voigt + '_ {
+        move |p| self.deck.stress.get(&(e as u32, p as u32)).copied().unwrap_or(tensor::ZERO)
     }
 
-    fn solve(self, job: &Job) -> Result<Solved, LinearError> {
+    fn element(&self, e: usize) -> Element<'a> {
+        Element::new(self.deck, self.step, e)
+    }
+
+    /// Stiffness and forces of every element, and the stiffness of every spring.
+    fn stiffness(&self, job: &Job) -> Result<(BlockMatrix<1>, Vec<f64>), LinearError> {
         let loads = self.distributed()?;
+        self.assembled(job, |e, k, f| match e.checked_sub(self.deck.cells.len()) {
+            None => {
+                let (element, warmth) = (self.element(e), self.warmth(e));
+                element.stiffness(&warmth, self.initial(e), k, f)?;
+                loads.add(e, &element, &warmth, f)
+            }
+            Some(spring) => {
+                let spring = &self.deck.springs[spring];
+                for (row, a) in k.chunks_mut(spring.terms.len()).zip(&spring.terms) {
+                    let force = spring.stiffness * a.1;
+                    row.iter_mut().zip(&spring.terms).for_each(|(k, b)| *k += force * b.1);
+                }
+                Ok(())
+            }
+        })
+    }
+
+    /// Tᵀ K T and Tᵀ (f − K c) of what `fill` says of elements and springs.
+    fn assembled(
+        &self,
+        job: &Job,
+        fill: impl Fn(usize, &mut [f64], &mut [f64]) -> Result<(), Folded> + Sync,
+    ) -> Result<(BlockMatrix<1>, Vec<f64>), LinearError> {
         let pattern = Pattern::new(self.places.clone(), &self.elements)?;
         let mut matrix = BlockMatrix::<1>::zeros(pattern.into());
         let mut rhs = vec![0.0; self.places.len()];
         matrix.assemble_with(&self.elements, &mut rhs, job, |e, k, f| {
-            self.reduced(e, &loads, k, f)
+            let unknowns = self.unknowns(e);
+            let n = unknowns.len();
+            let (mut full, mut force) = (vec![0.0; n * n], vec![0.0; n]);
+            let label = || self.deck.cells.get(e).map_or(0, |c| c.label);
+            fill(e, &mut full, &mut force).map_err(|Folded| LinearError::Folded(label()))?;
+            self.reduced(self.elements.get(e), &unknowns, (&full, &force), k, f);
+            Ok::<_, LinearError>(())
         })?;
-        self.nodal(&mut rhs)?;
-        let none = Constraints::new(self.places.len());
-        let solution = if rhs.is_empty() {
-            Vec::new()
-        } else {
-            let floating = || LinearError::Floating { step: self.step.name.clone() };
-            let found = solve(&matrix, &rhs, &none, Method::Direct, TOLERANCE, job);
-            let found = found.map_err(|e| match e {
-                SolveError::Indefinite { .. }
-                | SolveError::NoStiffness { .. }
-                | SolveError::NotConverged { .. } => floating(),
-                other => other.into(),
-            })?;
-            if found.negative_eigenvalues > 0 {
-                return Err(floating());
-            }
-            found.x
-        };
-        self.gather(&solution)
+        Ok((matrix, rhs))
     }
 
-    /// Tᵀ K T and Tᵀ (f − K c) of an element.
+    /// K and f of the unknowns of an element to those of what is free.
     fn reduced(
         &self,
-        e: usize,
-        loads: &Loads<'_>,
+        members: &[u32],
+        unknowns: &[u32],
+        (full, force): (&[f64], &[f64]),
         k: &mut [f64],
         f: &mut [f64],
-    ) -> Result<(), LinearError> {
-        let cell = &self.deck.cells[e];
-        let n = 3 * cell.nodes.len();
-        let element = Element::new(self.deck, cell);
-        let (mut full, mut force) = (vec![0.0; n * n], vec![0.0; n]);
-        let folded = |Folded| LinearError::Folded(cell.label);
-        element
-            .stiffness(&self.warmth(cell), self.initial(e), &mut full, &mut force)
-            .map_err(folded)?;
-        loads.add(e, &element, &mut force).map_err(folded)?;
-        let sums: Vec<&Sum> = Self::unknowns(cell).map(|u| &self.sums[u as usize]).collect();
-        let members = self.elements.get(e);
+    ) {
+        let n = unknowns.len();
+        let sums: Vec<&Sum> = unknowns.iter().map(|&u| &self.sums[u as usize]).collect();
         // Places of every unknown's terms among those of the element.
-        let shares: Vec<Vec<(usize, f64)>> = sums
-            .iter()
-            .map(|s| {
-                s.terms.iter().filter_map(|(u, c)| Some((self.place(members, *u)?, *c))).collect()
-            })
-            .collect();
+        let place = |free: &u32| {
+            let number = self.numbers.get(free)?;
+            members.iter().position(|m| m == number)
+        };
+        let share = |s: &&Sum| s.terms.iter().filter_map(|(u, c)| Some((place(u)?, *c))).collect();
+        let shares: Vec<Vec<(usize, f64)>> = sums.iter().map(share).collect();
         for (i, share) in shares.iter().enumerate() {
             let row = &full[i * n..(i + 1) * n];
             let moved: f64 = row.iter().zip(&sums).map(|(k, s)| k * s.constant).sum();
@@ -240,13 +324,115 @@ impl<'a> System<'a> {
                 }
             }
         }
-        Ok(())
     }
 
-    /// Where a free unknown stands among those of an element.
-    fn place(&self, members: &[u32], free: u32) -> Option<usize> {
-        let number = self.numbers.get(&free)?;
-        members.iter().position(|m| m == number)
+    fn solve(self, past: &mut Past, job: &Job) -> Result<Solved, LinearError> {
+        let (all, stresses, unknowns) = self.moved(job)?;
+        let places: Vec<DVec3> =
+            all.as_chunks::<3>().0.iter().copied().map(DVec3::from_array).collect();
+        let displacement = |n: u32| match self.deck.means.get(&n) {
+            None => places[n as usize],
+            Some(mean) => mean.iter().map(|&(m, share)| share * places[m as usize]).sum(),
+        };
+        let displacements = (0..self.deck.labels.len() as u32).map(displacement);
+        past.displacements.clone_from(&all);
+        past.stresses.clone_from(&stresses);
+        Ok(Solved {
+            name: self.step.name.clone(),
+            displacements: displacements.collect(),
+            stresses,
+            unknowns,
+            ..Solved::default()
+        })
+    }
+
+    /// Displacements of every unknown, stresses, and how many unknowns were solved for.
+    fn moved(&self, job: &Job) -> Result<(Vec<f64>, Vec<Vec<Voigt>>, usize), LinearError> {
+        let (matrix, mut rhs) = self.stiffness(job)?;
+        self.nodal(&mut rhs)?;
+        let none = Constraints::new(self.places.len());
+        let solution = if rhs.is_empty() {
+            Vec::new()
+        } else {
+            let found = solve(&matrix, &rhs, &none, Method::Direct, TOLERANCE, job);
+            let found = found.map_err(|e| self.explained(e))?;
+            if found.negative_eigenvalues > 0 {
+                return Err(self.floating());
+            }
+            found.x
+        };
+        let all = self.expanded(&solution);
+        let stresses = self.stresses(&all)?;
+        Ok((all, stresses, solution.len()))
+    }
+
+    fn floating(&self) -> LinearError {
+        LinearError::Floating { step: self.step.name.clone() }
+    }
+
+    /// What it says of a structure that its matrix is singular.
+    fn explained(&self, error: SolveError) -> LinearError {
+        match error {
+            SolveError::Indefinite { .. }
+            | SolveError::NoStiffness { .. }
+            | SolveError::NotConverged { .. } => self.floating(),
+            other => other.into(),
+        }
+    }
+
+    /// The smallest squares of angular frequencies, with what stresses add to the stiffness.
+    fn modes(
+        &self,
+        count: usize,
+        stresses: &[Vec<Voigt>],
+        job: &Job,
+    ) -> Result<Solved, LinearError> {
+        let (mut stiffness, _) = self.stiffness(job)?;
+        if !stresses.is_empty() {
+            stiffness.add(1.0, &self.stress_stiffness(stresses, job)?);
+        }
+        let cells = self.deck.cells.len();
+        let (mass, _) = self.assembled(job, |e, m, _| {
+            if e < cells { self.element(e).mass(&self.warmth(e), m) } else { Ok(()) }
+        })?;
+        let found = modes::smallest(stiffness, &mass, count, job);
+        self.eigenvalues(found)
+    }
+
+    /// The smallest factors at which the loads of the step make the structure unstable:
+    /// (K + λ K_σ) φ = 0.
+    fn buckling(&self, count: usize, job: &Job) -> Result<Solved, LinearError> {
+        let (_, stresses, _) = self.moved(job)?;
+        let (stiffness, _) = self.stiffness(job)?;
+        let mut softening = self.stress_stiffness(&stresses, job)?;
+        softening.scale(-1.0);
+        let found = modes::smallest(stiffness, &softening, count, job);
+        self.eigenvalues(found)
+    }
+
+    fn eigenvalues(&self, found: Result<Vec<f64>, modes::Failed>) -> Result<Solved, LinearError> {
+        let step = self.step.name.clone();
+        let eigenvalues = found.map_err(|failed| match failed {
+            modes::Failed::Solve(error) => self.explained(error),
+            modes::Failed::Indefinite => LinearError::Unstable { step: step.clone() },
+            modes::Failed::NotConverged => {
+                LinearError::NotConverged { step: step.clone(), what: "eigenvalues" }
+            }
+        })?;
+        let unknowns = self.places.len();
+        Ok(Solved { name: step, eigenvalues, unknowns, ..Solved::default() })
+    }
+
+    fn stress_stiffness(
+        &self,
+        stresses: &[Vec<Voigt>],
+        job: &Job,
+    ) -> Result<BlockMatrix<1>, LinearError> {
+        let (matrix, _) = self.assembled(job, |e, k, _| match stresses.get(e) {
+            Some(stress) => self.element(e).stress_stiffness(stress, k),
+            None => Ok(()),
+        })?;
+        Ok(matrix)
     }
 
     /// What acts on elements.
@@ -256,13 +442,12 @@ impl<'a> System<'a> {
             loads.by_cell.entry(cell).or_default().0.push((face, value));
         }
         for (cell, pull) in &self.step.pulls {
-            let of = &self.deck.cells[*cell as usize];
-            let material = &self.deck.materials[of.material as usize];
-            if material.density <= 0.0 {
+            let element = self.element(*cell as usize);
+            if element.material().density.is_none() {
                 return Err(LinearError::Weightless {
                     step: self.step.name.clone(),
-                    element: of.label,
-                    material: material.name.clone(),
+                    element: self.deck.cells[*cell as usize].label,
+                    material: element.material().name.clone(),
                 });
             }
             loads.by_cell.entry(*cell).or_default().1.push(pull);
@@ -273,60 +458,79 @@ impl<'a> System<'a> {
     /// Adds forces at nodes.
     fn nodal(&self, rhs: &mut [f64]) -> Result<(), LinearError> {
         for (&(node, component), &force) in &self.step.forces {
+            let own = [(node, 1.0)];
+            let on = self.deck.shares.get(&node).map_or(&own[..], Vec::as_slice);
             for (unknown, share) in self.deck.component(node, component) {
-                for (free, factor) in &self.sums[unknown as usize].terms {
-                    let Some(&number) = self.numbers.get(free) else {
-                        if force == 0.0 {
-                            continue;
-                        }
-                        let node = self.deck.labels.get(node as usize).copied().unwrap_or(0);
-                        return Err(LinearError::Idle { step: self.step.name.clone(), node });
-                    };
-                    rhs[number as usize] += factor * share * force;
+                for &(other, part) in on {
+                    self.push(3 * other + unknown % 3, share * part * force, node, rhs)?;
                 }
             }
         }
         Ok(())
     }
 
-    /// Displacements and stresses.
-    fn gather(&self, solution: &[f64]) -> Result<Solved, LinearError> {
+    /// Adds a force at an unknown, which is that of a node of the deck.
+    fn push(
+        &self,
+        unknown: u32,
+        force: f64,
+        node: u32,
+        rhs: &mut [f64],
+    ) -> Result<(), LinearError> {
+        for (free, factor) in &self.sums[unknown as usize].terms {
+            match self.numbers.get(free) {
+                Some(&number) => rhs[number as usize] += factor * force,
+                None if force == 0.0 => {}
+                None => {
+                    let node = self.deck.labels.get(node as usize).copied().unwrap_or(0);
+                    return Err(LinearError::Idle { step: self.step.name.clone(), node });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Every unknown by what was solved for.
+    fn expanded(&self, solution: &[f64]) -> Vec<f64> {
         let value = |sum: &Sum| {
             let part = |(u, c): &(u32, f64)| {
                 self.numbers.get(u).map_or(0.0, |&n| c * solution[n as usize])
             };
             sum.constant + sum.terms.iter().map(part).sum::<f64>()
         };
-        let all: Vec<f64> = self.sums.iter().map(value).collect();
-        let stress = |(e, cell): (usize, &Cell)| {
-            let own: Vec<f64> = Self::unknowns(cell).map(|u| all[u as usize]).collect();
-            Element::new(self.deck, cell)
-                .stresses(&own, &self.warmth(cell), self.initial(e))
-                .map_err(|Folded| LinearError::Folded(cell.label))
+        self.sums.iter().map(value).collect()
+    }
+
+    /// Stresses of every element for these displacements.
+    fn stresses(&self, all: &[f64]) -> Result<Vec<Vec<Voigt>>, LinearError> {
+        let stress = |e: usize| {
+            let own: Vec<f64> = self.unknowns(e).into_iter().map(|u| all[u as usize]).collect();
+            let found = self.element(e).stresses(&own, &self.warmth(e), self.initial(e));
+            found.map_err(|Folded| LinearError::Folded(self.deck.cells[e].label))
         };
-        let stresses = self.deck.cells.iter().enumerate().map(stress).collect::<Result<_, _>>()?;
-        let displacements =
-            all.as_chunks::<3>().0[..self.deck.labels.len()].iter().copied().map(DVec3::from_array);
-        Ok(Solved {
-            name: self.step.name.clone(),
-            displacements: displacements.collect(),
-            stresses,
-            unknowns: solution.len(),
-        })
+        (0..self.deck.cells.len()).map(stress).collect()
     }
 }
 
 /// Pressures (face, Pa) and pulls of elements.
 struct Loads<'a> {
-    by_cell: HashMap<u32, (Vec<(u8, f64)>, Vec<&'a super::model::Pull>)>,
+    by_cell: HashMap<u32, (Vec<(u8, f64)>, Vec<&'a Pull>)>,
 }
 
 impl Loads<'_> {
-    fn add(&self, e: usize, element: &Element<'_>, force: &mut [f64]) -> Result<(), Folded> {
+    fn add(
+        &self,
+        e: usize,
+        element: &Element<'_>,
+        warmth: &Warmth,
+        force: &mut [f64],
+    ) -> Result<(), Folded> {
         let Some((pressures, pulls)) = self.by_cell.get(&(e as u32)) else { return Ok(()) };
         pressures.iter().for_each(|&(face, p)| element.pressure(usize::from(face), p, force));
+        let warm = warmth.now.iter().sum::<f64>() / warmth.now.len() as f64;
+        let density = element.density(warm);
         for pull in pulls {
-            element.volume_force(|at| element.density() * pull.at(at), force)?;
+            element.volume_force(|at| density * pull.at(at), force)?;
         }
         Ok(())
     }

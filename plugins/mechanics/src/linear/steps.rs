@@ -7,10 +7,13 @@ use glam::DVec3;
 use super::{
     constraint::Equation,
     flat::{Plane, SLICE},
-    matter::ORDER,
-    model::{Pull, Step},
+    law::ORDER,
+    matter::all_numbers,
+    model::{Heated, Material, Procedure, Pull, Step},
     read::{Kind, Reader, Surface, plain},
+    thin::Thin,
     tie::{self, Face},
+    warm::is_temperature,
 };
 use crate::{
     model::interpolate,
@@ -24,33 +27,45 @@ use crate::{
 
 /// A value, the amplitude that it follows, and the step that set it (0: before the first).
 #[derive(Debug, Clone)]
-struct Given<T> {
-    value: T,
-    amplitude: Option<String>,
-    step: u32,
+pub(super) struct Given<T> {
+    pub(super) value: T,
+    pub(super) amplitude: Option<String>,
+    pub(super) step: u32,
 }
 
 /// What is in force.
 #[derive(Default)]
 pub(super) struct State {
     held: BTreeMap<(u32, u8), Given<f64>>,
+    kept: BTreeMap<(u32, u8), Given<f64>>,
     forces: BTreeMap<(u32, u8), Given<f64>>,
     pressures: BTreeMap<(u32, u8), Given<f64>>,
     pulls: BTreeMap<(String, String), Given<(Vec<u32>, Pull)>>,
     warm: BTreeMap<u32, Given<f64>>,
-    step: u32,
-    /// The step that is open: its name, line and duration.
-    open: Option<(String, u32, f64)>,
+    temperatures: BTreeMap<u32, Given<f64>>,
+    pub(super) heating: BTreeMap<Heated, Given<[f64; 2]>>,
+    materials: BTreeMap<u32, u32>,
+    pub(super) step: u32,
+    open: Option<Open>,
     /// When the steps before it ended.
     time: f64,
+}
+
+/// The step that is open.
+struct Open {
+    name: String,
+    line: u32,
+    duration: f64,
+    perturbs: bool,
+    procedure: Option<Procedure>,
 }
 
 impl State {
     /// Every step that began has ended, and there was one.
     pub(super) fn ended(&self) -> Result<(), Fault> {
         match &self.open {
-            Some((_, line, _)) => {
-                Err(Fault::at(*line, "*STEP without *END STEP: is the deck cut off?"))
+            Some(open) => {
+                Err(Fault::at(open.line, "*STEP without *END STEP: is the deck cut off?"))
             }
             None if self.step == 0 => Err(Fault::whole("no *STEP: there is nothing to compute")),
             None => Ok(()),
@@ -62,29 +77,42 @@ impl Reader {
     /// Everything that has an order.
     pub(super) fn history(&mut self, card: &Card<'_>, state: &mut State) -> Result<(), Fault> {
         let name = plain(card);
-        let within = ["STATIC", "ENDSTEP", "CLOAD", "DLOAD", "DSLOAD", "TEMPERATURE"];
-        if within.contains(&name.as_str()) && state.open.is_none() {
+        const WITHIN: &str = "STATIC FREQUENCY BUCKLE HEATTRANSFER ENDSTEP CLOAD DLOAD DSLOAD \
+            TEMPERATURE CFLUX DFLUX FILM RADIATE CHANGESOLIDSECTION";
+        if WITHIN.split_ascii_whitespace().any(|w| w == name) && state.open.is_none() {
             return Err(card.fault(format!("*{} must stand in a *STEP", card.name)));
         }
         match name.as_str() {
             "STEP" => begin(card, state),
-            "STATIC" => timing(card, state),
+            "STATIC" | "FREQUENCY" | "BUCKLE" | "HEATTRANSFER" => procedure(card, &name, state),
             "ENDSTEP" => self.close(state),
             "BOUNDARY" => self.boundary(card, state),
             "CLOAD" => self.cload(card, state),
             "DLOAD" | "DSLOAD" => self.dload(card, state, name == "DSLOAD"),
             "TEMPERATURE" => self.temperature(card, state),
+            "CFLUX" | "DFLUX" | "FILM" | "RADIATE" => self.heating(card, state),
+            "CHANGESOLIDSECTION" => self.change(card, state),
             "INITIALCONDITIONS" => self.initial(card),
+            "PHYSICALCONSTANTS" => self.constants(card),
             _ => Ok(()),
         }
     }
 
     /// What is in force at the end of the step.
     fn close(&mut self, state: &mut State) -> Result<(), Fault> {
-        let Some((name, line, duration)) = state.open.take() else { return Ok(()) };
-        let mut step = Step { name, ..Step::default() };
+        let Some(open) = state.open.take() else { return Ok(()) };
+        let Open { name, line, duration, .. } = open;
+        let procedure = open.procedure.unwrap_or_default();
+        self.suits(procedure, state, line)?;
+        let mut step = Step { name, number: state.step, procedure, ..Step::default() };
+        let in_time = matches!(procedure, Procedure::Heat { steady: false, .. });
         let factor = |amplitude: &Option<String>| -> Result<f64, Fault> {
             let Some(name) = amplitude else { return Ok(1.0) };
+            if in_time {
+                let why =
+                    "what heats over time is computed where it stays the same, without AMPLITUDE";
+                return Err(Fault::at(line, why));
+            }
             let missing = || Fault::at(line, format!("amplitude {} is not defined", quote(name)));
             let amplitude = self.amplitudes.get(name).ok_or_else(missing)?;
             let time = if amplitude.total_time { state.time + duration } else { duration };
@@ -98,6 +126,18 @@ impl Reader {
         };
         (step.held, step.forces) = (at_end(&state.held)?, at_end(&state.forces)?);
         step.pressures = at_end(&state.pressures)?;
+        step.kept = state.kept.keys().copied().collect();
+        step.materials.clone_from(&state.materials);
+        if let Procedure::Heat { .. } | Procedure::Modes { heat: true, .. } = procedure {
+            for (&node, given) in &state.temperatures {
+                step.temperatures.insert(node, given.value * factor(&given.amplitude)?);
+            }
+            for (&heated, given) in &state.heating {
+                let factor = factor(&given.amplitude)?;
+                // The temperature beyond a face stays.
+                step.heating.insert(heated, [given.value[0] * factor, given.value[1]]);
+            }
+        }
         for pull in state.pulls.values() {
             let factor = factor(&pull.amplitude)?;
             let (elements, pull) = &pull.value;
@@ -114,10 +154,66 @@ impl Reader {
         Ok(())
     }
 
+    /// Materials have what the step needs, and the step follows one that it rests on.
+    fn suits(&self, procedure: Procedure, state: &State, line: u32) -> Result<(), Fault> {
+        let used =
+            self.deck.cells.iter().map(|c| c.material).chain(state.materials.values().copied());
+        let lacks = |has: fn(&Material) -> bool, what: &str| {
+            let mut used = used.clone().map(|m| &self.deck.materials[m as usize]);
+            match used.find(|m| !has(m)) {
+                Some(m) => Err(Fault::at(line, format!("material {} has no {what}", m.name))),
+                None => Ok(()),
+            }
+        };
+        let heats =
+            matches!(procedure, Procedure::Heat { .. } | Procedure::Modes { heat: true, .. });
+        if !heats {
+            lacks(|m| m.elastic.is_some(), "*ELASTIC")?;
+        }
+        if let Procedure::Modes { heat: false, .. } = procedure {
+            lacks(|m| m.density.is_some(), "*DENSITY")?;
+        }
+        if let Procedure::Modes { stressed: true, .. } = procedure {
+            let before = self.deck.steps.last();
+            if before.is_none_or(|s| s.procedure != Procedure::Static) {
+                return Err(Fault::at(
+                    line,
+                    "PERTURBATION: needed is a *STATIC step before this one",
+                ));
+            }
+            if before.is_some_and(|s| s.pulls.iter().any(|p| matches!(p.1, Pull::Spin { .. }))) {
+                return Err(Fault::at(line, "vibrations of what spins are not computed"));
+            }
+        }
+        if !heats {
+            return Ok(());
+        }
+        if let Some(raw) = self.raw.iter().find(|r| matches!(r.kind, Kind::Thin(_))) {
+            let why = "heat in beams and shells is not computed";
+            return Err(Fault::at(raw.line, format!("element {}: {why}", raw.label)));
+        }
+        lacks(|m| m.conductivity.is_some(), "*CONDUCTIVITY")?;
+        if !matches!(procedure, Procedure::Heat { steady: true, .. }) {
+            lacks(|m| m.density.is_some(), "*DENSITY")?;
+            lacks(|m| m.specific_heat.is_some(), "*SPECIFIC HEAT")?;
+        }
+        if self.tied {
+            return Err(Fault::at(line, "heat through a *TIE is not computed"));
+        }
+        Ok(())
+    }
+
     fn boundary(&mut self, card: &Card<'_>, state: &mut State) -> Result<(), Fault> {
-        card.only(&["OP", "AMPLITUDE"])?;
-        clear(card, state.step, &mut state.held)?;
+        card.only(&["OP", "AMPLITUDE", "FIXED"])?;
+        clear(card, state.step, &mut state.held, |_| true)?;
+        clear(card, state.step, &mut state.kept, |_| true)?;
+        clear(card, state.step, &mut state.temperatures, |_| true)?;
         let amplitude = super::mesh::name_of(card, "AMPLITUDE")?;
+        let step = state.step;
+        let keeps = card.get("FIXED").is_some();
+        if keeps && step < 2 {
+            return Err(card.fault("*BOUNDARY, FIXED holds what a step before has moved"));
+        }
         for row in card.rows() {
             let words: Vec<&str> = row.fields().collect();
             let [target, first, rest @ ..] = words.as_slice() else {
@@ -125,13 +221,66 @@ impl Reader {
             };
             let last = rest.first().filter(|w| !w.is_empty()).unwrap_or(first);
             let value = rest.get(1).map_or(Ok(0.0), |w| row.number(w))?;
+            if is_temperature(first) {
+                for node in self.some_nodes(target, row)? {
+                    let given = Given { value, amplitude: amplitude.clone(), step };
+                    state.temperatures.insert(node, given);
+                }
+                continue;
+            }
             let (first, last) = (component(first, row)?, component(last, row)?);
             for node in self.some_nodes(target, row)? {
                 for component in first..=last {
-                    let value = value * self.units.length();
-                    let given = Given { value, amplitude: amplitude.clone(), step: state.step };
-                    state.held.insert((node, component), given);
+                    let (at, unit) = self.motion(node, component, Some(state.step), row)?;
+                    let given = Given { value: value * unit, amplitude: amplitude.clone(), step };
+                    if keeps {
+                        state.held.remove(&at);
+                        state.kept.insert(at, given);
+                    } else {
+                        state.held.insert(at, given);
+                    }
                 }
+            }
+        }
+        Ok(())
+    }
+
+    /// The node and component that a component from 0 to 5 of a node is, and the unit of its value:
+    /// metres, or one for angles, which a support (of that step) holds otherwise than a moment.
+    fn motion(
+        &mut self,
+        node: u32,
+        component: u8,
+        supported: Option<u32>,
+        row: Row<'_>,
+    ) -> Result<((u32, u8), f64), Fault> {
+        let Some(angle) = component.checked_sub(3) else {
+            return Ok(((node, component), self.units.length()));
+        };
+        let label = self.deck.labels[node as usize];
+        if self.deck.turned.contains_key(&node) {
+            return Err(row.fault(format!("angles of node {label}, which a *TRANSFORM turns")));
+        }
+        let known = self.turning.get(&node).copied();
+        let turning = self.angles(node, supported, row).or(known);
+        let none = || {
+            row.fault(format!(
+                "node {label} has no component {}: solids have 1 to 3",
+                component + 1
+            ))
+        };
+        Ok(((turning.ok_or_else(none)?, angle), 1.0))
+    }
+
+    /// `*CHANGE SOLID SECTION`
+    fn change(&mut self, card: &Card<'_>, state: &mut State) -> Result<(), Fault> {
+        card.only(&["ELSET", "MATERIAL"])?;
+        let material = card.need("MATERIAL")?;
+        let undefined = || card.fault(format!("material {} is not defined", quote(&material)));
+        let &material = self.materials.get(&material).ok_or_else(undefined)?;
+        for element in self.named_elements(card)? {
+            if let Some(cell) = self.raw[element as usize].cell {
+                state.materials.insert(cell, material);
             }
         }
         Ok(())
@@ -140,7 +289,7 @@ impl Reader {
     /// Forces. What is given twice in a step adds up, as in CalculiX.
     fn cload(&mut self, card: &Card<'_>, state: &mut State) -> Result<(), Fault> {
         card.only(&["OP", "AMPLITUDE"])?;
-        clear(card, state.step, &mut state.forces)?;
+        clear(card, state.step, &mut state.forces, |_| true)?;
         let amplitude = super::mesh::name_of(card, "AMPLITUDE")?;
         let around = self.around_nodes();
         for row in card.rows() {
@@ -149,29 +298,32 @@ impl Reader {
             for node in self.some_nodes(target, row)? {
                 // A force on what is axially symmetric is that on the whole circle.
                 let share = if around.contains(&node) { SLICE / 360.0 } else { 1.0 };
-                let mut value = value * share;
-                if let Some(old) = state.forces.get(&(node, direction))
+                let (at, _) = self.motion(node, direction, None, row)?;
+                // A moment is of newtons and lengths.
+                let unit = if direction < 3 { 1.0 } else { self.units.length() };
+                let mut value = value * share * unit;
+                if let Some(old) = state.forces.get(&at)
                     && old.step == state.step
                 {
                     value += old.value;
                 }
                 let given = Given { value, amplitude: amplitude.clone(), step: state.step };
-                state.forces.insert((node, direction), given);
+                state.forces.insert(at, given);
             }
         }
         Ok(())
     }
 
-    fn around_nodes(&self) -> BTreeSet<u32> {
+    pub(super) fn around_nodes(&self) -> BTreeSet<u32> {
         let around = |kind| matches!(kind, Kind::Flat(flat) if flat.plane == Plane::Around);
         self.raw.iter().filter(|r| around(r.kind)).flat_map(|r| r.nodes.iter().copied()).collect()
     }
 
     fn dload(&mut self, card: &Card<'_>, state: &mut State, on_surface: bool) -> Result<(), Fault> {
         card.only(&["OP", "AMPLITUDE"])?;
-        clear(card, state.step, &mut state.pressures)?;
+        clear(card, state.step, &mut state.pressures, |_| true)?;
         if !on_surface {
-            clear(card, state.step, &mut state.pulls)?;
+            clear(card, state.step, &mut state.pulls, |_| true)?;
         }
         let amplitude = super::mesh::name_of(card, "AMPLITUDE")?;
         for row in card.rows() {
@@ -182,7 +334,7 @@ impl Reader {
             let (kind, value) = (kind.to_ascii_uppercase(), row.number(value)?);
             let step = state.step;
             if matches!(kind.as_str(), "GRAV" | "CENTRIF") && !on_surface {
-                let elements = self.some_elements(target, row)?;
+                let elements = self.some_cells(target, row)?;
                 let pull = self.pull(&kind, value, rest, row)?;
                 let given = Given { value: (elements, pull), amplitude: amplitude.clone(), step };
                 state.pulls.insert((target.to_ascii_uppercase(), kind), given);
@@ -208,15 +360,34 @@ impl Reader {
         let kinds = "P1 to P6, GRAV and CENTRIF, and P on a *DSLOAD";
         let is_face = kind.len() == 2 && kind.starts_with('P');
         match (on_surface, self.surfaces.get(&target.to_ascii_uppercase())) {
-            (true, Some(Surface::Faces(faces))) if kind == "P" => Ok(faces.clone()),
+            (true, Some(Surface::Faces(faces))) if kind == "P" => Ok(self.cell_faces(faces)),
             (true, None) => Err(row.fault(format!("surface {} is not defined", quote(target)))),
-            (false, _) if is_face => self
-                .some_elements(target, row)?
-                .into_iter()
-                .map(|e| Ok((e, self.face(e, kind, "P", row)?)))
-                .collect(),
+            (false, _) if kind == "P" => {
+                // A pressure on a shell pushes along its normal: it acts on the lower face.
+                let elements = self.some_elements(target, row)?;
+                let shell =
+                    |e: &u32| matches!(self.raw[*e as usize].kind, Kind::Thin(Thin::Shell { .. }));
+                if let Some(&other) = elements.iter().find(|e| !shell(e)) {
+                    let label = self.raw[other as usize].label;
+                    return Err(row.fault(format!("P is of shells, which element {label} is not")));
+                }
+                let faces: Vec<(u32, u8)> = elements.into_iter().map(|e| (e, 0)).collect();
+                Ok(self.cell_faces(&faces))
+            }
+            (false, _) if is_face => {
+                let elements = self.some_elements(target, row)?;
+                let face = |e| Ok((e, self.face(e, kind, "P", row)?));
+                let faces: Vec<(u32, u8)> =
+                    elements.into_iter().map(face).collect::<Result<_, _>>()?;
+                Ok(self.cell_faces(&faces))
+            }
             _ => Err(row.fault(format!("load {} is not supported; {kinds} are", quote(kind)))),
         }
+    }
+
+    /// Faces of solids that faces of elements are.
+    fn cell_faces(&self, faces: &[(u32, u8)]) -> Vec<(u32, u8)> {
+        faces.iter().filter_map(|&(e, face)| Some((self.raw[e as usize].cell?, face))).collect()
     }
 
     /// Weight: g and its direction. Spin: ω², a point of the axis and its direction.
@@ -238,7 +409,7 @@ impl Reader {
 
     fn temperature(&mut self, card: &Card<'_>, state: &mut State) -> Result<(), Fault> {
         card.only(&["OP", "AMPLITUDE"])?;
-        clear(card, state.step, &mut state.warm)?;
+        clear(card, state.step, &mut state.warm, |_| true)?;
         let amplitude = super::mesh::name_of(card, "AMPLITUDE")?;
         for row in card.rows() {
             let [target, value] = row.exactly("node or set, temperature")?;
@@ -270,9 +441,11 @@ impl Reader {
             }
             "PLASTIC STRAIN" | "PLASTICSTRAIN" => self.at_points(card, |reader, e, mut v| {
                 (3..6).for_each(|i| v[i] *= 2.0);
-                let material = reader.deck.cells[e as usize].material;
-                let law = &reader.deck.materials[material as usize].stiffness;
-                tensor::scale(&tensor::apply(law, &v), -1.0)
+                let cell = &reader.deck.cells[e as usize];
+                let law = reader.deck.materials[cell.material as usize].elastic.as_ref();
+                let cold = cell.nodes.first().map_or(0.0, |&n| reader.deck.cold[n as usize]);
+                let law = law.map_or([[0.0; 6]; 6], |l| l.stiffness(cold));
+                tensor::scale(&tensor::apply(&law, &v), -1.0)
             }),
             _ => Err(card.fault(format!(
                 "TYPE={}: TEMPERATURE, STRESS and PLASTIC STRAIN are supported",
@@ -294,7 +467,7 @@ impl Reader {
             for (word, at) in numbers.iter().zip(ORDER) {
                 given[at] = row.number(word)?;
             }
-            for element in self.some_elements(element, row)? {
+            for element in self.some_cells(element, row)? {
                 let points = self.deck.cells[element as usize].shape.points().len();
                 let point = point.parse::<u32>().ok().filter(|p| (1..=points as u32).contains(p));
                 let point = point
@@ -328,7 +501,8 @@ impl Reader {
                 }
                 for [node, direction, factor] in all {
                     let (node, factor) = (self.node(node, next)?, next.number(factor)?);
-                    let own = self.deck.component(node, component(direction, next)?);
+                    let (at, _) = self.motion(node, component(direction, next)?, None, next)?;
+                    let own = self.deck.component(at.0, at.1);
                     terms.extend(own.into_iter().map(|(u, f)| (u, f * factor)));
                 }
             }
@@ -338,18 +512,19 @@ impl Reader {
     }
 
     /// `*TIE`: what is tied, and the surface that it is tied to.
-    pub(super) fn tied(&mut self, card: &Card<'_>) -> Result<(), Fault> {
+    pub(super) fn tie(&mut self, card: &Card<'_>) -> Result<(), Fault> {
         if plain(card) != "TIE" {
             return Ok(());
         }
         card.only(&["NAME", "POSITION TOLERANCE", "ADJUST"])?;
+        self.tied = true;
         let row = card.one_row()?.ok_or_else(|| card.fault("needed are: slave, master"))?;
         let [slave, master] = row.exactly("slave, master")?;
         let find = |name: &str| {
             let undefined = || row.fault(format!("surface {} is not defined", quote(name)));
             self.surfaces.get(&name.to_ascii_uppercase()).ok_or_else(undefined)
         };
-        let face = |&(cell, face): &(u32, u8)| Face::new(&self.deck, cell, face);
+        let face = |&(e, face): &(u32, u8)| Face::new(&self.deck, self.raw[e as usize].cell?, face);
         let Surface::Faces(faces) = find(master)? else {
             return Err(row.fault("the master of a *TIE is a surface of faces"));
         };
@@ -402,41 +577,108 @@ impl Reader {
 
 /// Opens a step.
 fn begin(card: &Card<'_>, state: &mut State) -> Result<(), Fault> {
-    if let Some((_, line, _)) = &state.open {
-        return Err(card.fault(format!("the step of line {line} has no *END STEP")));
+    if let Some(open) = &state.open {
+        return Err(card.fault(format!("the step of line {} has no *END STEP", open.line)));
     }
     state.step += 1;
-    state.open = Some((format!("step {}", state.step), card.line, 1.0));
-    card.only(&["NAME", "INC", "AMPLITUDE", "NLGEOM"])?;
+    state.open = Some(Open {
+        name: format!("step {}", state.step),
+        line: card.line,
+        duration: 1.0,
+        perturbs: card.get("PERTURBATION").is_some(),
+        procedure: None,
+    });
+    card.only(&["NAME", "INC", "AMPLITUDE", "NLGEOM", "PERTURBATION"])?;
     if card.word("NLGEOM").is_some_and(|v| v != "NO") {
         return Err(card.fault("*STEP, NLGEOM: large displacements are not computed"));
     }
     Ok(())
 }
 
-/// First increment and duration.
-fn timing(card: &Card<'_>, state: &mut State) -> Result<(), Fault> {
-    card.only(&["SOLVER", "DIRECT"])?;
-    let Some(row) = card.one_row()? else { return Ok(()) };
-    let duration = row.fields().nth(1).filter(|w| !w.is_empty()).map(|w| row.number(w));
-    if let (Some(duration), Some(open)) = (duration.transpose()?, &mut state.open) {
-        if duration.is_nan() || duration <= 0.0 {
-            return Err(row.fault(format!("a duration of {duration} s")));
-        }
-        open.2 = duration;
+/// What a step computes, and how.
+fn procedure(card: &Card<'_>, name: &str, state: &mut State) -> Result<(), Fault> {
+    let Some(open) = &mut state.open else { return Ok(()) };
+    if open.procedure.is_some() {
+        return Err(card.fault("a step has one procedure: *END STEP is missing"));
     }
+    let numbers = all_numbers(card)?;
+    let has = |parameter: &str| card.get(parameter).is_some();
+    let modes =
+        |stressed, heat| Ok(Procedure::Modes { count: many(card, &numbers)?, stressed, heat });
+    let procedure = match name {
+        "STATIC" if open.perturbs => {
+            return Err(card.fault("*STATIC in a step of PERTURBATION is not computed"));
+        }
+        "STATIC" => {
+            card.only(&["SOLVER", "DIRECT"])?;
+            open.duration = duration(card, &numbers)?;
+            Procedure::Static
+        }
+        "FREQUENCY" => {
+            card.only(&["SOLVER", "STORAGE", "GLOBAL"])?;
+            modes(open.perturbs, false)?
+        }
+        "BUCKLE" if open.perturbs => {
+            return Err(card.fault("*BUCKLE in a step of PERTURBATION is not computed"));
+        }
+        "BUCKLE" => {
+            card.only(&["SOLVER"])?;
+            Procedure::Buckling { count: many(card, &numbers)? }
+        }
+        _ => {
+            const ALLOWED: [&str; 7] = [
+                "STEADY STATE",
+                "FREQUENCY",
+                "SOLVER",
+                "DIRECT",
+                "DELTMX",
+                "TIME RESET",
+                "STORAGE",
+            ];
+            card.only(&ALLOWED)?;
+            if has("FREQUENCY") {
+                modes(false, true)?
+            } else {
+                open.duration = duration(card, &numbers)?;
+                let first = numbers.first().map_or(open.duration, |f| f.min(open.duration));
+                if first.is_nan() || first <= 0.0 {
+                    return Err(card.fault(format!("a first increment of {first} s")));
+                }
+                let steady = has("STEADY STATE");
+                Procedure::Heat { steady, first, duration: open.duration }
+            }
+        }
+    };
+    open.procedure = Some(procedure);
     Ok(())
 }
 
+fn duration(card: &Card<'_>, numbers: &[f64]) -> Result<f64, Fault> {
+    match numbers.get(1) {
+        Some(d) if d.is_nan() || *d <= 0.0 => Err(card.fault(format!("a duration of {d} s"))),
+        other => Ok(other.copied().unwrap_or(1.0)),
+    }
+}
+
+/// How many eigenvalues.
+fn many(card: &Card<'_>, numbers: &[f64]) -> Result<usize, Fault> {
+    let count = numbers.first().copied().unwrap_or(0.0);
+    if (1.0..=10_000.0).contains(&count) && count.fract() == 0.0 {
+        return Ok(count as usize);
+    }
+    Err(card.fault(format!("*{} needs how many eigenvalues, from 1 to 10000", card.name)))
+}
+
 /// `OP=NEW` drops what earlier steps have left.
-fn clear<K: Ord, T>(
+pub(super) fn clear<K: Ord, T>(
     card: &Card<'_>,
     step: u32,
     map: &mut BTreeMap<K, Given<T>>,
+    concerns: impl Fn(&K) -> bool,
 ) -> Result<(), Fault> {
     match card.word("OP").as_deref() {
         None | Some("MOD") => {}
-        Some("NEW") => map.retain(|_, g| g.step == step),
+        Some("NEW") => map.retain(|k, g| g.step == step || !concerns(k)),
         Some(other) => {
             return Err(card.fault(format!("OP={}: MOD and NEW are supported", quote(other))));
         }
@@ -446,7 +688,7 @@ fn clear<K: Ord, T>(
 
 fn component(word: &str, row: Row<'_>) -> Result<u8, Fault> {
     match word.parse::<u8>() {
-        Ok(c @ 1..=3) => Ok(c - 1),
-        _ => Err(row.fault(format!("{} is no component: solids have 1 to 3", quote(word)))),
+        Ok(c @ 1..=6) => Ok(c - 1),
+        _ => Err(row.fault(format!("{} is no component: 1 to 6 are", quote(word)))),
     }
 }

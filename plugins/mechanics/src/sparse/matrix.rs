@@ -44,6 +44,29 @@ impl<const B: usize> BlockMatrix<B> {
         self.values.par_chunks_mut(1 << 12).for_each(|c| c.fill([[0.0; B]; B]));
     }
 
+    /// Adds `factor` times another matrix of the same pattern.
+    ///
+    /// # Panics
+    /// If it has another number of blocks.
+    pub(crate) fn add(&mut self, factor: f64, other: &Self) {
+        assert_eq!(self.values.len(), other.values.len());
+        let to = self.values.as_flattened_mut().as_flattened_mut();
+        let from = other.values.as_flattened().as_flattened();
+        to.iter_mut().zip(from).for_each(|(a, b)| *a += factor * b);
+    }
+
+    /// So many times as much.
+    pub(crate) fn scale(&mut self, factor: f64) {
+        let values = self.values.as_flattened_mut().as_flattened_mut();
+        values.iter_mut().for_each(|a| *a *= factor);
+    }
+
+    /// Sum of the diagonal.
+    pub(crate) fn trace(&self) -> f64 {
+        let own = |i| self.diagonal(i).iter().enumerate().map(|(r, row)| row[r]).sum::<f64>();
+        (0..self.nodes()).map(own).sum()
+    }
+
     /// A spring to the ground: adds `stiffness` to the diagonal at this component of this node.
     ///
     /// # Panics

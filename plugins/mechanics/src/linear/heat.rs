@@ -1,0 +1,382 @@
+//! Conduction of heat: ∫ ρc Ṫ δT + ∫ ∇δT · k ∇T = ∫ q δT, with films and radiation on faces
+//! (Lewis, Nithiarasu and Seetharamu, *Fundamentals of the Finite Element Method for Heat and Fluid
+//! Flow*, ch. 3 and 6). Newton's method where conductivity or radiation changes with temperature;
+//! in time, Euler's backward steps, each also as two halves: their difference is the error, and
+//! twice the halves less the whole is of second order.
+
+use std::collections::HashMap;
+
+use glam::DVec3;
+use intrados_stage::Job;
+
+use super::{
+    element::{Element, Folded, pairs},
+    law::Table,
+    model::{Cell, Deck, Heated, Heating, Step},
+    modes::{self, Failed},
+    solve::{LinearError, Solved},
+};
+use crate::sparse::{
+    BlockMatrix, Connectivity, Constraints, Method, Pattern, Place, SolveError, solve as direct,
+};
+
+/// Newton's steps; fewer than ten where nothing but radiation is nonlinear.
+const STEPS: usize = 200;
+/// Change of a temperature that counts as none, over the largest.
+const SETTLED: f64 = 1e-11;
+/// Error of a step of time before it is corrected, over the range of temperatures.
+const ACCURACY: f64 = 1e-4;
+/// Steps of time.
+const TIMES: usize = 20_000;
+
+/// Temperatures at the end of a step, from those at its beginning. `time`: the first increment and
+/// the duration; none where nothing changes any more.
+pub(super) fn solve(
+    deck: &Deck,
+    step: &Step,
+    time: Option<[f64; 2]>,
+    temperatures: &mut Vec<f64>,
+    job: &Job,
+) -> Result<Solved, LinearError> {
+    let body = Body::new(deck, step);
+    for (&node, &value) in &step.temperatures {
+        temperatures[node as usize] = value;
+    }
+    deck.spread(temperatures);
+    match time {
+        None => *temperatures = body.settled(temperatures, None, job)?,
+        Some(times) => body.march(temperatures, times, job)?,
+    }
+    Ok(Solved {
+        name: step.name.clone(),
+        temperatures: temperatures[..deck.labels.len()].to_vec(),
+        unknowns: body.places.len(),
+        ..Solved::default()
+    })
+}
+
+/// The smallest rates at which differences of temperature decay.
+pub(super) fn modes(
+    deck: &Deck,
+    step: &Step,
+    count: usize,
+    job: &Job,
+) -> Result<Solved, LinearError> {
+    let body = Body::new(deck, step);
+    let cold = &deck.cold;
+    let (conduction, _) = body.assembled(job, |e, k, f| body.flow(e, cold, k, f))?;
+    let (capacity, _) = body.assembled(job, |e, m, _| body.capacity(e, cold, m))?;
+    let eigenvalues = modes::smallest(conduction, &capacity, count, job).map_err(|e| match e {
+        Failed::Solve(error) => error.into(),
+        _ => body.lost("eigenvalues"),
+    })?;
+    let unknowns = body.places.len();
+    Ok(Solved { name: step.name.clone(), eigenvalues, unknowns, ..Solved::default() })
+}
+
+/// What is heated in a step.
+struct Body<'a> {
+    deck: &'a Deck,
+    step: &'a Step,
+    /// Number of every node whose temperature is solved for.
+    numbers: HashMap<u32, u32>,
+    nodes: Vec<u32>,
+    places: Vec<Place>,
+    /// Numbers of every element.
+    elements: Connectivity,
+    loads: HashMap<u32, Vec<(Heated, [f64; 2])>>,
+}
+
+impl<'a> Body<'a> {
+    fn new(deck: &'a Deck, step: &'a Step) -> Self {
+        let mut body = Self {
+            deck,
+            step,
+            numbers: HashMap::new(),
+            nodes: Vec::new(),
+            places: Vec::new(),
+            elements: Connectivity::default(),
+            loads: HashMap::new(),
+        };
+        for cell in &deck.cells {
+            let mut free: Vec<u32> = cell.nodes.iter().map(|&n| body.owner(n)).collect();
+            free.retain(|n| !step.temperatures.contains_key(n));
+            free.sort_unstable();
+            free.dedup();
+            let numbered: Vec<u32> = free.into_iter().map(|n| body.number(n)).collect();
+            body.elements.push(&numbered);
+        }
+        for (&heated, &value) in step.heating.iter().filter(|(h, _)| h.0 != Heating::Node) {
+            body.loads.entry(heated.1).or_default().push((heated, value));
+        }
+        body
+    }
+
+    /// The node that a node has its temperature from.
+    fn owner(&self, node: u32) -> u32 {
+        self.deck.twins.get(&node).copied().unwrap_or(node)
+    }
+
+    fn number(&mut self, node: u32) -> u32 {
+        let next = self.places.len() as u32;
+        let number = *self.numbers.entry(node).or_insert(next);
+        if number == next {
+            self.places.push(Place::point(self.deck.nodes[node as usize].to_array()));
+            self.nodes.push(node);
+        }
+        number
+    }
+
+    fn lost(&self, what: &'static str) -> LinearError {
+        LinearError::NotConverged { step: self.step.name.clone(), what }
+    }
+
+    /// Temperatures that balance, from a guess; `before` is what they were, and how long ago, s.
+    fn settled(
+        &self,
+        guess: &[f64],
+        before: Option<(&[f64], f64)>,
+        job: &Job,
+    ) -> Result<Vec<f64>, LinearError> {
+        let (mut now, linear) = (guess.to_vec(), self.is_linear());
+        for _ in 0..STEPS {
+            let (matrix, mut rhs) = self.assembled(job, |e, k, f| {
+                self.flow(e, &now, k, f)?;
+                before.map_or(Ok(()), |(old, duration)| self.storage(e, &now, old, duration, k, f))
+            })?;
+            for (&(_, node, _), value) in
+                self.step.heating.iter().filter(|(h, _)| h.0 == Heating::Node)
+            {
+                if let Some(&number) = self.numbers.get(&self.owner(node)) {
+                    rhs[number as usize] += value[0];
+                }
+            }
+            if rhs.is_empty() {
+                return Ok(now);
+            }
+            let none = Constraints::new(rhs.len());
+            let found = direct(&matrix, &rhs, &none, Method::Direct, 1e-7, job);
+            let change = found.map_err(|error| self.explained(error))?.x;
+            self.nodes.iter().zip(&change).for_each(|(&n, d)| now[n as usize] += d);
+            self.deck.spread(&mut now);
+            let largest = |all: &[f64]| all.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
+            if linear || largest(&change) <= SETTLED * largest(&now) {
+                return Ok(now);
+            }
+        }
+        Err(self.lost("temperatures"))
+    }
+
+    fn explained(&self, error: SolveError) -> LinearError {
+        match error {
+            SolveError::Indefinite { .. }
+            | SolveError::NoStiffness { .. }
+            | SolveError::NotConverged { .. } => {
+                LinearError::Adrift { step: self.step.name.clone() }
+            }
+            other => other.into(),
+        }
+    }
+
+    /// Whether nothing depends on the temperature.
+    fn is_linear(&self) -> bool {
+        let constant = |c: &Cell| {
+            let material = &self.deck.materials[c.material as usize];
+            let all = [&material.density, &material.specific_heat];
+            material.conductivity.as_ref().is_none_or(Table::is_constant)
+                && all.into_iter().flatten().all(Table::is_constant)
+        };
+        self.deck.cells.iter().all(constant)
+            && self.step.materials.is_empty()
+            && self.step.heating.keys().all(|h| h.0 != Heating::Radiation)
+    }
+
+    /// Steps of time that are as long as their error allows, but never shorter than a tenth of what
+    /// the deck begins with.
+    fn march(
+        &self,
+        now: &mut Vec<f64>,
+        [first, duration]: [f64; 2],
+        job: &Job,
+    ) -> Result<(), LinearError> {
+        let (mut time, mut step) = (0.0, first.min(duration));
+        for _ in 0..TIMES {
+            job.step((1e4 * time / duration) as usize, 10_000)?;
+            let left = duration - time;
+            let ends = step >= left * (1.0 - 1e-9);
+            let long = if ends { left } else { step };
+            let whole = self.settled(now, Some((now, long)), job)?;
+            let half = self.settled(now, Some((now, 0.5 * long)), job)?;
+            let halves = self.settled(&half, Some((&half, 0.5 * long)), job)?;
+            let range = |pick: fn(f64, f64) -> f64, from: f64| {
+                self.deck
+                    .cells
+                    .iter()
+                    .flat_map(|c| &c.nodes)
+                    .fold(from, |a, &n| pick(pick(a, now[n as usize]), halves[n as usize]))
+            };
+            let size = range(f64::max, f64::MIN) - range(f64::min, f64::MAX);
+            let apart = whole.iter().zip(&halves).map(|(a, b)| (a - b).abs());
+            let error = apart.fold(0.0, f64::max) / (ACCURACY * size.max(1e-9));
+            if error <= 1.0 || long <= 0.1 * first {
+                *now = whole.iter().zip(&halves).map(|(a, b)| 2.0 * b - a).collect();
+                time += long;
+                if ends {
+                    return Ok(());
+                }
+            }
+            // The error of a step grows with its square.
+            step = long * (0.9 / error.sqrt()).clamp(0.2, 3.0);
+        }
+        Err(self.lost("temperatures"))
+    }
+
+    /// Matrix and residual of what is free, of what `fill` says of elements.
+    fn assembled(
+        &self,
+        job: &Job,
+        fill: impl Fn(usize, &mut [f64], &mut [f64]) -> Result<(), Folded> + Sync,
+    ) -> Result<(BlockMatrix<1>, Vec<f64>), LinearError> {
+        let pattern = Pattern::new(self.places.clone(), &self.elements)?;
+        let mut matrix = BlockMatrix::<1>::zeros(pattern.into());
+        let mut rhs = vec![0.0; self.places.len()];
+        matrix.assemble_with(&self.elements, &mut rhs, job, |e, k, f| {
+            let cell = &self.deck.cells[e];
+            let n = cell.nodes.len();
+            let (mut full, mut flow) = (vec![0.0; n * n], vec![0.0; n]);
+            fill(e, &mut full, &mut flow).map_err(|Folded| LinearError::Folded(cell.label))?;
+            let members = self.elements.get(e);
+            let place = |n: &u32| {
+                let number = self.numbers.get(&self.owner(*n))?;
+                members.iter().position(|m| m == number)
+            };
+            let places: Vec<Option<usize>> = cell.nodes.iter().map(place).collect();
+            for (a, row) in places.iter().enumerate().filter_map(|(a, p)| Some((a, (*p)?))) {
+                f[row] += flow[a];
+                for (b, column) in places.iter().enumerate().filter_map(|(b, p)| Some((b, (*p)?))) {
+                    k[row * members.len() + column] += full[a * n + b];
+                }
+            }
+            Ok::<_, LinearError>(())
+        })?;
+        Ok((matrix, rhs))
+    }
+
+    fn own(&self, e: usize, all: &[f64]) -> Vec<f64> {
+        self.deck.cells[e].nodes.iter().map(|&n| all[n as usize]).collect()
+    }
+
+    /// Tangent and what flows into the nodes: conduction and everything that heats the element.
+    fn flow(&self, e: usize, all: &[f64], k: &mut [f64], f: &mut [f64]) -> Result<(), Folded> {
+        let (element, own) = (Element::new(self.deck, self.step, e), self.own(e, all));
+        let n = own.len();
+        let loads = self.loads.get(&(e as u32)).map_or(&[][..], Vec::as_slice);
+        let volume: f64 = loads.iter().filter(|l| l.0.0 == Heating::Volume).map(|l| l.1[0]).sum();
+        for (natural, weight) in element.shape().points() {
+            let at = element.at(natural, weight)?;
+            let here = at.value(&own);
+            let law = element.material().conductivity.as_ref();
+            let along = law.map_or([0.0; 3], |l| l.at(here));
+            let frame = element.frame(at.place);
+            let conducted = |slope: &[f64; 3]| -> DVec3 {
+                let slope = DVec3::from_array(*slope);
+                match &frame {
+                    None => slope * DVec3::from_array(along),
+                    Some(rows) => rows
+                        .iter()
+                        .zip(along)
+                        .map(|(axis, k)| {
+                            let axis = DVec3::from_array(*axis);
+                            k * axis.dot(slope) * axis
+                        })
+                        .sum(),
+                }
+            };
+            for (a, b) in pairs(n) {
+                let flux =
+                    at.volume * conducted(&at.slopes[a]).dot(DVec3::from_array(at.slopes[b]));
+                k[a * n + b] += flux;
+                f[a] -= flux * own[b];
+            }
+            for (f, jet) in f.iter_mut().zip(&at.jets) {
+                *f += at.volume * volume * jet.value;
+            }
+        }
+        for &((heating, _, face), value) in loads {
+            self.surface(&element, (heating, usize::from(face), value), &own, k, f);
+        }
+        Ok(())
+    }
+
+    /// What flows through a face.
+    fn surface(
+        &self,
+        element: &Element<'_>,
+        (heating, face, [value, beyond]): (Heating, usize, [f64; 2]),
+        own: &[f64],
+        k: &mut [f64],
+        f: &mut [f64],
+    ) {
+        let Some(nodes) = element.shape().faces().nth(face) else { return };
+        for (jets, area) in element.face_points(face) {
+            let area = area.length();
+            let here: f64 = jets.iter().zip(nodes).map(|(j, &n)| j.value * own[n]).sum();
+            // What flows in, and how much less by a degree.
+            let (flux, slope) = match heating {
+                Heating::Film => (value * (beyond - here), value),
+                Heating::Radiation => {
+                    let zero = self.deck.absolute_zero;
+                    let (a, b) = (here - zero, beyond - zero);
+                    (value * (b.powi(4) - a.powi(4)), 4.0 * value * a.powi(3))
+                }
+                Heating::Face => (value, 0.0),
+                Heating::Node | Heating::Volume => continue,
+            };
+            for (ja, &a) in jets.iter().zip(nodes) {
+                f[a] += area * flux * ja.value;
+                for (jb, &b) in jets.iter().zip(nodes) {
+                    k[a * own.len() + b] += area * slope * ja.value * jb.value;
+                }
+            }
+        }
+    }
+
+    /// ∫ ρc N Nᵀ.
+    fn capacity(&self, e: usize, all: &[f64], m: &mut [f64]) -> Result<(), Folded> {
+        let (element, own) = (Element::new(self.deck, self.step, e), self.own(e, all));
+        let n = own.len();
+        for (natural, weight) in element.shape().fine_points() {
+            let at = element.at(natural, weight)?;
+            let here = at.value(&own);
+            let heat = element.material().specific_heat.as_ref().map_or(0.0, |c| c.at(here)[0]);
+            let by_volume = at.volume * element.density(here) * heat;
+            for (a, b) in pairs(n) {
+                m[a * n + b] += by_volume * at.jets[a].value * at.jets[b].value;
+            }
+        }
+        Ok(())
+    }
+
+    /// What is stored by the second.
+    fn storage(
+        &self,
+        e: usize,
+        now: &[f64],
+        old: &[f64],
+        duration: f64,
+        k: &mut [f64],
+        f: &mut [f64],
+    ) -> Result<(), Folded> {
+        let n = f.len();
+        let mut m = vec![0.0; n * n];
+        self.capacity(e, now, &mut m)?;
+        let change: Vec<f64> =
+            self.own(e, now).iter().zip(self.own(e, old)).map(|(a, b)| a - b).collect();
+        for (a, b) in pairs(n) {
+            let rate = m[a * n + b] / duration;
+            k[a * n + b] += rate;
+            f[a] -= rate * change[b];
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,321 @@
+//! What joins nodes without a solid: springs, rigid bodies, mean rotations, loads shared among
+//! nodes, and cuts that are pulled together.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use glam::DVec3;
+
+use super::{
+    constraint::Equation,
+    matter::all_numbers,
+    mesh::name_of,
+    model::Spring,
+    read::{Kind, Reader, Surface, plain},
+};
+use crate::read::{
+    Fault,
+    abaqus::card::{Card, Row},
+    quote,
+};
+
+/// What joins nodes and has a number as elements have.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Link {
+    /// SPRINGA: along the line between two nodes.
+    Between,
+    /// SPRING1: a component of a node to the ground.
+    Ground,
+    /// SPRING2: a component of one node to a component of another.
+    Components,
+    /// DCOUP3D: the node of a `*DISTRIBUTING COUPLING`.
+    Coupling,
+}
+
+impl Link {
+    pub(super) fn of(name: &str) -> Option<Self> {
+        match name {
+            "SPRINGA" => Some(Self::Between),
+            "SPRING1" => Some(Self::Ground),
+            "SPRING2" => Some(Self::Components),
+            "DCOUP3D" => Some(Self::Coupling),
+            _ => None,
+        }
+    }
+
+    pub(super) fn nodes(self) -> usize {
+        match self {
+            Self::Between | Self::Components => 2,
+            Self::Ground | Self::Coupling => 1,
+        }
+    }
+}
+
+/// Factors of the displacements of places whose sum is their mean rotation about an axis: with r
+/// the distance of each from the axis through their middle, (1/n) Σ (a × r)·(u − ū)/|r|² (Dhondt,
+/// *The Finite Element Method for Three-Dimensional Thermomechanical Applications*, sec. 3.6).
+/// Places on the axis say nothing; none where all lie on it.
+pub(super) fn mean_rotation(places: &[DVec3], axis: DVec3) -> Option<Vec<DVec3>> {
+    let middle = places.iter().sum::<DVec3>() / places.len() as f64;
+    let arms: Vec<DVec3> =
+        places.iter().map(|&p| (p - middle).reject_from_normalized(axis)).collect();
+    let reach = arms.iter().map(|r| r.length()).fold(0.0, f64::max);
+    let beside = |r: &&DVec3| r.length() > 1e-6 * reach;
+    let count = arms.iter().filter(beside).count() as f64;
+    if reach == 0.0 || count < 1.0 {
+        return None;
+    }
+    let turn = |r: &DVec3| axis.cross(*r) / (count * r.length_squared());
+    let own: Vec<DVec3> =
+        arms.iter().map(|r| if beside(&r) { turn(r) } else { DVec3::ZERO }).collect();
+    let mean = own.iter().sum::<DVec3>() / places.len() as f64;
+    Some(own.into_iter().map(|c| c - mean).collect())
+}
+
+/// Components of nodes with their factors.
+pub(super) fn terms(nodes: &[u32], factors: &[DVec3]) -> Vec<(u32, f64)> {
+    let three = |(&n, f): (&u32, &DVec3)| [(3 * n, f.x), (3 * n + 1, f.y), (3 * n + 2, f.z)];
+    nodes.iter().zip(factors).flat_map(three).filter(|t| t.1 != 0.0).collect()
+}
+
+impl Reader {
+    pub(super) fn linked(&mut self, card: &Card<'_>) -> Result<(), Fault> {
+        match plain(card).as_str() {
+            "SPRING" => self.spring(card),
+            "MPC" => self.mean_rotations(card),
+            "RIGIDBODY" => self.rigid_body(card),
+            "DISTRIBUTINGCOUPLING" => self.coupling(card),
+            _ => Ok(()),
+        }
+    }
+
+    fn spring(&mut self, card: &Card<'_>) -> Result<(), Fault> {
+        card.only(&["ELSET"])?;
+        let elements = self.named_elements(card)?;
+        let rows: Vec<Row<'_>> = card.rows().collect();
+        let first = rows.first().ok_or_else(|| card.fault("needed is: stiffness"))?;
+        for element in elements {
+            let raw = self.raw[element as usize].clone();
+            let Kind::Link(link) = raw.kind else {
+                return Err(card.fault(format!("element {} is no spring", raw.label)));
+            };
+            let components = match link {
+                Link::Between => Vec::new(),
+                _ => first.fields().map(|w| direction(w, *first)).collect::<Result<_, _>>()?,
+            };
+            let data = if link == Link::Between { first } else { rows.last().unwrap_or(first) };
+            let word = data.fields().next().unwrap_or_default();
+            let stiffness = data.number(word)? * self.units.stress() * self.units.length();
+            let terms = self.spring_terms(&raw.nodes, link, &components);
+            let terms = terms.ok_or_else(|| {
+                card.fault(format!("spring {} has no length, or no component", raw.label))
+            })?;
+            self.deck.springs.push(Spring { terms, stiffness });
+            self.sprung.insert(element);
+        }
+        Ok(())
+    }
+
+    fn spring_terms(&self, nodes: &[u32], link: Link, by: &[u8]) -> Option<Vec<(u32, f64)>> {
+        let signed = |n: u32, c: u8, s: f64| {
+            self.deck.component(n, c).into_iter().map(move |(u, f)| (u, s * f))
+        };
+        match (link, nodes) {
+            (Link::Between, &[a, b]) => {
+                let along = self.deck.nodes[b as usize] - self.deck.nodes[a as usize];
+                let along = along.try_normalize()?;
+                Some(terms(nodes, &[-along, along]))
+            }
+            (Link::Ground, &[a]) => Some(signed(a, *by.first()?, 1.0).collect()),
+            (Link::Components, &[a, b]) => {
+                let (first, second) = (*by.first()?, *by.get(1).or(by.first())?);
+                Some(signed(a, first, 1.0).chain(signed(b, second, -1.0)).collect())
+            }
+            _ => None,
+        }
+    }
+
+    /// Every `MEANROT`: nodes, each for its three components, and the node whose place is the axis
+    /// and whose first component is the angle.
+    fn mean_rotations(&mut self, card: &Card<'_>) -> Result<(), Fault> {
+        card.only(&[])?;
+        let mut rows = card.rows().peekable();
+        while let Some(row) = rows.next() {
+            let mut words = row.fields().filter(|w| !w.is_empty());
+            let kind = words.next().unwrap_or_default().to_ascii_uppercase();
+            if kind != "MEANROT" {
+                return Err(row.fault(format!("*MPC: {}: MEANROT is supported", quote(&kind))));
+            }
+            let mut nodes: Vec<u32> = words.map(|w| self.node(w, row)).collect::<Result<_, _>>()?;
+            while let Some(next) =
+                rows.next_if(|r| !r.text.starts_with(|c: char| c.is_ascii_alphabetic()))
+            {
+                for word in next.fields().filter(|w| !w.is_empty()) {
+                    nodes.push(self.node(word, next)?);
+                }
+            }
+            let pilot = nodes.pop().ok_or_else(|| row.fault("MEANROT needs nodes"))?;
+            nodes.dedup();
+            let axis = self.deck.nodes[pilot as usize].try_normalize();
+            let axis = axis.ok_or_else(|| row.fault("the axis of MEANROT has no length"))?;
+            let places: Vec<DVec3> = nodes.iter().map(|&n| self.deck.nodes[n as usize]).collect();
+            let factors = mean_rotation(&places, axis)
+                .ok_or_else(|| row.fault("the nodes of MEANROT lie on one axis"))?;
+            // The pilot is an angle: its unit is not that of lengths.
+            let mut all = terms(&nodes, &factors);
+            all.push((3 * pilot, -1.0 / self.units.length()));
+            self.deck.equations.push(Equation { terms: all, value: 0.0, line: row.line });
+        }
+        Ok(())
+    }
+
+    /// u = u₀ + θ × (x − x₀) of every node of the set.
+    fn rigid_body(&mut self, card: &Card<'_>) -> Result<(), Fault> {
+        card.only(&["NSET", "ELSET", "REF NODE", "ROT NODE"])?;
+        if !card.rows().collect::<Vec<_>>().is_empty() {
+            return Err(card.fault("*RIGID BODY has no lines of data"));
+        }
+        let row = Row { line: card.line, text: "" };
+        let nodes: BTreeSet<u32> = match name_of(card, "NSET")? {
+            Some(set) => self.some_nodes(&set, row)?.into_iter().collect(),
+            None => {
+                let elements = self.named_elements(card)?;
+                elements.iter().flat_map(|&e| self.raw[e as usize].nodes.clone()).collect()
+            }
+        };
+        let reference = self.node(&card.need("REF NODE")?, row)?;
+        let turning = match name_of(card, "ROT NODE")? {
+            Some(word) => self.node(&word, row)?,
+            None => {
+                let turning = self.hidden_node(reference);
+                self.turning.insert(reference, turning);
+                turning
+            }
+        };
+        let origin = self.deck.nodes[reference as usize];
+        // Components of a node that turns are angles.
+        let unit = if self.turning.contains_key(&reference) { 1.0 } else { self.units.length() };
+        for node in nodes.into_iter().filter(|&n| n != reference && n != turning) {
+            let arm = self.deck.nodes[node as usize] - origin;
+            for i in 0..3_u32 {
+                let along = DVec3::AXES[i as usize];
+                let mut terms = vec![(3 * node + i, 1.0), (3 * reference + i, -1.0)];
+                // (θ × r)·e = θ·(r × e).
+                let turned = arm.cross(along) / unit;
+                for (j, factor) in turned.to_array().into_iter().enumerate() {
+                    if factor != 0.0 {
+                        terms.push((3 * turning + j as u32, -factor));
+                    }
+                }
+                self.deck.equations.push(Equation { terms, value: 0.0, line: card.line });
+            }
+        }
+        Ok(())
+    }
+
+    /// The node of a coupling moves as the weighted mean of others.
+    fn coupling(&mut self, card: &Card<'_>) -> Result<(), Fault> {
+        card.only(&["ELSET", "NAME"])?;
+        let elements = self.named_elements(card)?;
+        let mut weights: BTreeMap<u32, f64> = BTreeMap::new();
+        for row in card.rows() {
+            let [target, weight] = row.exactly("node or set, weight")?;
+            let weight = row.number(weight)?;
+            if weight.is_nan() || weight <= 0.0 {
+                return Err(row.fault("a weight must be above 0"));
+            }
+            self.some_nodes(target, row)?.into_iter().for_each(|n| {
+                weights.insert(n, weight);
+            });
+        }
+        let sum: f64 = weights.values().sum();
+        for element in elements {
+            let raw = &self.raw[element as usize];
+            let (Kind::Link(Link::Coupling), &[node]) = (raw.kind, raw.nodes.as_slice()) else {
+                return Err(card.fault(format!("element {} is no DCOUP3D", raw.label)));
+            };
+            for i in 0..3 {
+                let mut terms = vec![(3 * node + i, 1.0)];
+                terms.extend(weights.iter().map(|(n, w)| (3 * n + i, -w / sum)));
+                self.deck.equations.push(Equation { terms, value: 0.0, line: card.line });
+            }
+            self.sprung.insert(element);
+        }
+        Ok(())
+    }
+
+    /// `*PRE-TENSION SECTION`: the nodes of a surface are doubled. Elements on its side move as
+    /// those beyond it do, and by the first component of a node farther along the normal.
+    pub(super) fn cut(&mut self, card: &Card<'_>) -> Result<(), Fault> {
+        if plain(card) != "PRE-TENSIONSECTION" {
+            return Ok(());
+        }
+        card.only(&["SURFACE", "NODE"])?;
+        let name = card.need("SURFACE")?;
+        let row = Row { line: card.line, text: "" };
+        let pilot = self.node(&card.need("NODE")?, row)?;
+        let Some(Surface::Faces(faces)) = self.surfaces.get(&name) else {
+            return Err(card.fault(format!("surface {} of faces is not defined", quote(&name))));
+        };
+        let mut nodes = BTreeSet::new();
+        let mut own = BTreeSet::new();
+        for &(element, face) in faces {
+            own.insert(element);
+            nodes.extend(self.raw[element as usize].side(face));
+        }
+        let axis = match all_numbers(card)?.as_slice() {
+            &[x, y, z] => DVec3::new(x, y, z).try_normalize(),
+            _ => None,
+        };
+        let axis = axis.ok_or_else(|| card.fault("needed are: x, y, z of the normal"))?;
+        let middle = |nodes: &[u32]| {
+            nodes.iter().map(|&n| self.deck.nodes[n as usize]).sum::<DVec3>() / nodes.len() as f64
+        };
+        let list: Vec<u32> = nodes.iter().copied().collect();
+        let at = middle(&list);
+        let side = |e: usize| (middle(&self.raw[e].nodes) - at).dot(axis) > 0.0;
+        let Some(&first) = own.first() else { return Ok(()) };
+        let inner = side(first as usize);
+        let touches = |e: &usize| self.raw[*e].nodes.iter().any(|n| nodes.contains(n));
+        let inside: Vec<usize> =
+            (0..self.raw.len()).filter(touches).filter(|&e| side(e) == inner).collect();
+        let twins: BTreeMap<u32, u32> = nodes.iter().map(|&n| (n, self.hidden_node(n))).collect();
+        for e in inside {
+            for node in &mut self.raw[e].nodes {
+                *node = twins.get(node).copied().unwrap_or(*node);
+            }
+        }
+        for (&node, &twin) in &twins {
+            for (i, along) in axis.to_array().into_iter().enumerate() {
+                let i = i as u32;
+                let mut terms = vec![(3 * twin + i, 1.0), (3 * node + i, -1.0)];
+                if along != 0.0 {
+                    terms.push((3 * pilot, -along));
+                }
+                self.deck.equations.push(Equation { terms, value: 0.0, line: card.line });
+            }
+        }
+        Ok(())
+    }
+
+    /// A node that the deck does not name, at the place of another.
+    pub(super) fn hidden_node(&mut self, like: u32) -> u32 {
+        let number = self.deck.nodes.len() as u32;
+        self.deck.nodes.push(self.deck.nodes[like as usize]);
+        self.deck.twins.insert(number, like);
+        number
+    }
+
+    /// The set that a card names by ELSET.
+    pub(super) fn named_elements(&self, card: &Card<'_>) -> Result<Vec<u32>, Fault> {
+        let set = card.need("ELSET")?;
+        let undefined = || card.fault(format!("element set {} is not defined", quote(&set)));
+        self.element_sets.get(&set).cloned().ok_or_else(undefined)
+    }
+}
+
+fn direction(word: &str, row: Row<'_>) -> Result<u8, Fault> {
+    match word.parse::<u8>() {
+        Ok(c @ 1..=3) => Ok(c - 1),
+        _ => Err(row.fault(format!("{} is no component of a spring: 1 to 3 are", quote(word)))),
+    }
+}
