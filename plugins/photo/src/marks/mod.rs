@@ -1,8 +1,8 @@
 //! Damage that is seen in a photograph: which pixels show a crack, missing cover, bared steel,
 //! rust, efflorescence.
 //!
-//! Two small U-Nets look at the picture, one for cracks and one for all else. They were trained by
-//! [`train`] on rendered pictures alone ([`lesson`]): no photograph was shown to them, and only the
+//! Two small U-Nets look at the picture, one for cracks first of all and one for all else. They were
+//! trained by [`train`] on rendered pictures alone ([`lesson`]): no photograph was shown to them, and only the
 //! thresholds of cracks were chosen on some. `plugins/photo/assets` holds the weights and how they came
 //! to be.
 
@@ -74,9 +74,9 @@ pub struct Network(Unet);
 /// What reads damage.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reader {
-    /// What finds cracks.
+    /// What finds cracks, and helps with all else.
     pub cracks: Network,
-    /// What finds all else.
+    /// What was trained for all else.
     pub areas: Network,
 }
 
@@ -100,7 +100,7 @@ impl Marks {
     }
 
     /// Where there is damage of a kind. With the carried weights most of bared steel and of rust is
-    /// found, a quarter of missing cover, little of efflorescence.
+    /// found, a quarter of missing cover, a tenth of efflorescence.
     #[must_use]
     pub fn areas(&self, mark: Mark) -> Mask {
         match mark {
@@ -211,7 +211,8 @@ impl Reader {
         self.marks_by(TILE, light, known, job)
     }
 
-    /// Cracks from all views; all else, which is broader, as it is.
+    /// Cracks from all views; all else, which is broader, as it is and by both networks: they err at
+    /// other places.
     fn marks_by(
         &self,
         tile: usize,
@@ -221,8 +222,8 @@ impl Reader {
     ) -> Result<Marks, Cancelled> {
         let sight = Sight::new(light, known, job)?;
         let [_, others @ ..] = Mark::ALL;
-        let areas = self.areas.look(&sight, known, others, tile, job)?;
-        let [near] = self.cracks.look(&sight, known, [Mark::Crack], tile, job)?;
+        let [near, of_one @ ..] = self.cracks.look(&sight, known, Mark::ALL, tile, job)?;
+        let of_other = self.areas.look(&sight, known, others, tile, job)?;
         let (mut looks, mut farther) = (vec![near], halved(light, known));
         while looks.len() < SCALES && farther.0.width.min(farther.0.height) >= SMALLEST {
             let (light, known) = &farther;
@@ -230,10 +231,21 @@ impl Reader {
             looks.extend(self.cracks.look(&sight, known, [Mark::Crack], tile, job)?);
             farther = halved(light, known);
         }
+        let areas = of_one.iter().zip(&of_other).map(|(one, other)| between(one, other));
         let mut grids = std::iter::once(together(looks, known)).chain(areas);
         let empty = || Grid::new(0, 0, 0.0);
         Ok(Marks { grids: std::array::from_fn(|_| grids.next().unwrap_or_else(empty)) })
     }
+}
+
+/// Halfway between two probabilities: the mean of their logits.
+fn between(one: &Grid<f32>, other: &Grid<f32>) -> Grid<f32> {
+    let mean = |(a, b): (&f32, &f32)| {
+        let [is, is_not] = [a * b, (1.0 - a) * (1.0 - b)].map(f32::sqrt);
+        is / (is + is_not).max(1e-12)
+    };
+    let data = one.data.iter().zip(&other.data).map(mean).collect();
+    Grid { width: one.width, height: one.height, data }
 }
 
 /// What the network says of a mark at a pixel.

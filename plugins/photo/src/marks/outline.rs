@@ -22,8 +22,9 @@ pub(super) const CRACKS: Threshold = Threshold { low: 0.55, high: 0.9, length: 6
 /// of what is found more than half is right.
 pub(super) fn sure(mark: Mark) -> f32 {
     match mark {
-        Mark::Steel | Mark::Rust => 0.85,
-        Mark::Crack | Mark::Spall | Mark::Efflorescence => 0.9,
+        Mark::Crack => 0.9,
+        Mark::Steel | Mark::Rust => 0.8,
+        Mark::Spall | Mark::Efflorescence => 0.6,
     }
 }
 
