@@ -14,6 +14,7 @@ use intrados_light::{
 use intrados_predict::Progress;
 use intrados_scene::{
     LoadError,
+    import::likely_unit,
     plugin::{CurrentScene, SceneChanged, SceneFailed},
 };
 use intrados_stage::{Jobs, Pace, catch};
@@ -147,6 +148,9 @@ pub(crate) fn greet(
         fixed(size.y, 2),
         fixed(size.z, 2)
     ));
+    if let Some(metres) = likely_unit(scene) {
+        banners.doubtful(&scene.name, size.max_element(), metres);
+    }
     for warning in &scene.warnings {
         log.say(format!("⚠ {}", term(warning)));
     }
