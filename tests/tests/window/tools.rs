@@ -1,6 +1,6 @@
 //! Tools of the structure's picture and of the sheet, and what is left of a session that broke off.
 
-use std::{fs, path::Path};
+use std::{collections::HashSet, fs, path::Path};
 
 use bevy_ecs::world::World;
 use egui::{Key, Modifiers};
@@ -131,6 +131,64 @@ fn keys_look_from_the_sides_and_go_through_slices() {
     window.harness.key_press(Key::Num1);
     window.frames(2);
     assert_eq!(window.with(|w| w.resource::<Look>().view), intrados_light::View::Primal);
+}
+
+/// Where the structure's picture has the colour of what is selected, once nothing moves any more.
+fn accents(window: &mut Window) -> HashSet<(u32, u32)> {
+    window.ask(Action::Tab("Structure"));
+    for _ in 0..40 {
+        window.frame();
+        rest();
+    }
+    let rect = window.harness.get_by_label("Damage of members").rect();
+    let picture = window.picture();
+    let mut marked = HashSet::new();
+    for (x, y, pixel) in picture.enumerate_pixels() {
+        let is_accent = pixel.0.iter().zip([255, 176, 0]).all(|(a, b)| a.abs_diff(b) < 40);
+        if is_accent && rect.contains(egui::pos2(x as f32, y as f32)) {
+            marked.insert((x, y));
+        }
+    }
+    marked
+}
+
+/// Where the slice of the CT tab lies is outlined on its member, and moves with it.
+#[test]
+fn the_slice_that_is_shown_is_outlined_on_its_member() {
+    let mut window = with_column();
+    window.until("the prediction", |w| w.resource::<Latest>().result.is_some());
+    window.ask(Action::Select(Some(1)));
+    window.frames(2);
+    let before = accents(&mut window);
+    let mut shown = |slice: &str, steps: bool| {
+        window.ask(Action::Tab("CT"));
+        window.until_seen("CT slice");
+        if steps {
+            window.ask(Action::StepSlice(true));
+        }
+        for _ in 0..2_000 {
+            window.frame();
+            if has(&window, slice) {
+                break;
+            }
+            rest();
+        }
+        accents(&mut window)
+    };
+    let [first, second] = [("slice 1 of", false), ("slice 2 of", true)].map(|(s, n)| shown(s, n));
+    assert!(first.difference(&before).count() > 20, "{} of {}", first.len(), before.len());
+    let height = |of: &HashSet<(u32, u32)>, without: &HashSet<(u32, u32)>| {
+        let own: Vec<u32> = of.difference(without).map(|(_, y)| *y).collect();
+        assert!(own.len() > 10, "{} of {}", own.len(), of.len());
+        own.iter().sum::<u32>() as f32 / own.len() as f32
+    };
+    let heights = [height(&first, &second), height(&second, &first)];
+    assert!((heights[0] - heights[1]).abs() > 3.0, "{heights:?}");
+    // Where no member is selected, no slice is shown.
+    window.ask(Action::Select(None));
+    window.frames(2);
+    let none = accents(&mut window);
+    assert!(none.len() < 10, "{}", none.len());
 }
 
 /// Through a tunnel the camera flies along its axis and halts where it is told to; however it ends,

@@ -6,6 +6,7 @@ mod measure;
 mod model;
 mod section;
 mod settled;
+mod slice;
 mod spot;
 mod time;
 
@@ -26,6 +27,7 @@ pub(crate) use spot::Spot;
 use crate::{
     Action, Actions, Latest, Selection,
     attach::Form,
+    ct::Ct,
     history::{Earlier, History},
     lang::fixed,
     moment::{Courses, Moment, Seen, Timeline},
@@ -263,6 +265,7 @@ pub(crate) fn structure(
     mut light: Light<'_>,
     mut form: ResMut<Form>,
     saving: Res<Saving>,
+    ct: Res<Ct>,
     mut jobs: ResMut<Jobs>,
     mut actions: ResMut<Actions>,
 ) {
@@ -327,6 +330,11 @@ pub(crate) fn structure(
     }
     structure.earlier.follow(&pointed.camera);
     compass::draw(ui, rect, &pointed.camera);
+    let sliced = selection.0.and_then(|member| Some((member, ct.plane(scene, member)?)));
+    if let Some((member, plane)) = sliced {
+        let triangles = structure.model.triangles(member);
+        slice::draw(ui, rect, &pointed.camera, triangles, plane);
+    }
     structure.tape.draw(ui, rect, &pointed.camera);
     structure.place.iter().for_each(|at| measure::end(ui, rect, &pointed.camera, *at));
     let shown = Shown { latest: &latest, seen: &seen, when };
