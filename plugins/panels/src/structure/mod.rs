@@ -35,6 +35,9 @@ use crate::{
     saving::Saving,
 };
 
+/// What one row of tools covers at the head of the picture, with a little air, points.
+const TOOLS: f32 = 48.0;
+
 /// Where the structure is looked at from.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum View {
@@ -108,7 +111,7 @@ pub(crate) struct Structure {
 impl Default for Structure {
     fn default() -> Self {
         Self {
-            model: model::Model::default(),
+            model: model::Model::below(TOOLS),
             earlier: model::Model::earlier(),
             names: true,
             section: None,
@@ -347,7 +350,7 @@ pub(crate) fn structure(
         return;
     }
     let bar = Rect::from_min_size(whole.min + vec2(8.0, 8.0), vec2(whole.width() - 16.0, 24.0));
-    ui.scope_builder(egui::UiBuilder::new().max_rect(bar), |ui| {
+    let drawn = ui.scope_builder(egui::UiBuilder::new().max_rect(bar), |ui| {
         ui.vertical(|ui| {
             let timeline = &courses.timeline;
             let time = (&mut moment, timeline, play.is_on);
@@ -359,6 +362,7 @@ pub(crate) fn structure(
             flown(ui, structure, scene, *selection, &mut actions);
         });
     });
+    structure.model.cover((drawn.response.rect.bottom() + 8.0 - whole.top()).max(TOOLS));
 }
 
 /// The way out of a picture with nothing in it.
