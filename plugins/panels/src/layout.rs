@@ -260,14 +260,15 @@ fn panels(ui: &mut Ui, world: &mut World) {
     });
 }
 
-/// What is going on: jobs, each with its progress and a way to stop it, and what was said last.
+/// What is going on: the newest job with its progress and a way to stop it, the others behind a
+/// button; and what was said last.
 fn status(ui: &mut Ui, world: &mut World) {
     ui.horizontal_centered(|ui| {
         let mut jobs = world.resource_mut::<Jobs>();
         let jobs = jobs.bypass_change_detection();
         let count = jobs.running().len();
         if count > 0 {
-            log::first(ui, jobs);
+            log::newest(ui, jobs);
         }
         if count > 1 {
             ui.menu_button(tr!("and {} more", count - 1), |ui| log::list(ui, jobs));

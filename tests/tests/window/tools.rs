@@ -14,7 +14,7 @@ use intrados_panels::{
 };
 use intrados_predict::{PredictSettings, Predicting};
 use intrados_scene::{Camera, plugin::CurrentScene};
-use intrados_stage::Work;
+use intrados_stage::{Job, Jobs, Task, Work};
 
 use super::{LONELY, Window, export, press, rest, type_into, with_column, with_lonely};
 
@@ -131,6 +131,33 @@ fn keys_look_from_the_sides_and_go_through_slices() {
     window.harness.key_press(Key::Num1);
     window.frames(2);
     assert_eq!(window.with(|w| w.resource::<Look>().view), intrados_light::View::Primal);
+}
+
+/// The line at the bottom shows the job that was asked for last, whatever else goes on.
+#[test]
+fn the_newest_job_is_the_one_at_the_bottom() {
+    let mut window = with_column();
+    window.until("rest", |w| {
+        w.resource::<Latest>().result.is_some() && w.resource_mut::<Jobs>().running().is_empty()
+    });
+    let begin = |window: &Window, name: &str| {
+        let wait = |job: &Job| {
+            while job.check().is_ok() {
+                rest();
+            }
+        };
+        window.with(|w| Task::spawn(&mut w.resource_mut::<Jobs>(), name, wait))
+    };
+    let older = begin(&window, "a long report");
+    let newer = begin(&window, "an import");
+    window.frames(2);
+    assert!(has(&window, "an import") && !has(&window, "a long report"));
+    assert!(has(&window, "and 1 more"));
+    drop(newer);
+    window.until("its end", |w| w.resource_mut::<Jobs>().running().len() == 1);
+    window.frames(2);
+    assert!(has(&window, "a long report") && !has(&window, "and 1 more"));
+    drop(older);
 }
 
 /// Where the structure's picture has the colour of what is selected, once nothing moves any more.
