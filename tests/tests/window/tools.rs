@@ -5,7 +5,7 @@ use std::{collections::HashSet, fs, path::Path};
 use bevy_ecs::world::World;
 use egui::{Key, Modifiers};
 use egui_kittest::kittest::{NodeT, Queryable};
-use glam::Vec3;
+use glam::{Mat4, Vec3};
 use intrados_forecast::ForecastSettings;
 use intrados_light::Render;
 use intrados_mechanics::plugin::{Analyses, ShownAt};
@@ -13,7 +13,7 @@ use intrados_panels::{
     Action, Latest, Lengths, Log, Look, PanelsPlugin, Refine, Selection, Viewpoint, Workspace,
 };
 use intrados_predict::{PredictSettings, Predicting};
-use intrados_scene::{Camera, plugin::CurrentScene};
+use intrados_scene::{Camera, Part, Scene, parametric::write_glb, plugin::CurrentScene};
 use intrados_stage::{Job, Jobs, Task, Work};
 
 use super::{LONELY, Window, export, press, rest, type_into, with_column, with_lonely};
@@ -131,6 +131,33 @@ fn keys_look_from_the_sides_and_go_through_slices() {
     window.harness.key_press(Key::Num1);
     window.frames(2);
     assert_eq!(window.with(|w| w.resource::<Look>().view), intrados_light::View::Primal);
+}
+
+/// Of a model that nobody builds as large, the unit is asked for, and a click opens it in the other
+/// one.
+#[test]
+fn a_model_in_millimetres_is_opened_in_metres_by_a_click() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let model = folder.path().join("large.glb");
+    let mut scene = Scene::open(Path::new("column"), &Job::default()).expect("a scene");
+    scene.members.clear();
+    for object in &mut scene.objects {
+        (object.name, object.member, object.part) = ("thing".into(), None, Part::Scenery);
+        object.transform = Mat4::from_scale(Vec3::splat(1e3)) * object.transform;
+    }
+    write_glb(&model, &scene).expect("a model");
+    let mut window = Window::new(|_| {});
+    window.ask(Action::Open(model));
+    window.until("a scene", |w| w.contains_resource::<CurrentScene>());
+    window.frames(2);
+    assert!(has(&window, "mm or m?"));
+    window.click("Open it in millimetres");
+    let project = folder.path().join("large.scaled.intrados");
+    window.until("its project", |w| w.resource::<CurrentScene>().0.path.starts_with(&project));
+    window.frames(2);
+    assert!(!has(&window, "mm or m?"));
+    let [low, high] = window.with(|w| w.resource::<CurrentScene>().0.bounds());
+    assert!((high - low).max_element() < 100.0, "{low} {high}");
 }
 
 /// The line at the bottom shows the job that was asked for last, whatever else goes on.
