@@ -45,6 +45,8 @@ pub enum Action {
     /// Make a project of the model that is open, in a folder beside it, and open that: only a
     /// project has a place for evidence.
     MakeProject,
+    /// The same of a model whose unit is doubted, with so many metres a unit.
+    Rescale(f64),
     /// Open what is open once more: in a world built anew where a [`Window`](crate::Window) holds
     /// it.
     Reload,
@@ -219,11 +221,8 @@ fn carry_out(world: &mut World, action: Action) {
         Action::TakePicture(path, panel) => take_picture(world, Some(path), panel),
         Action::CopyPicture(panel) => take_picture(world, None, panel),
         Action::Open(path) => open(world, path),
-        Action::MakeProject => {
-            if let Some(model) = world.get_resource::<CurrentScene>().map(|s| s.0.path.clone()) {
-                world.write_message(OpenAsProject(model));
-            }
-        }
+        Action::MakeProject => make_project(world, None),
+        Action::Rescale(metres) => make_project(world, Some(metres)),
         Action::Reload => {
             if let Some(path) = world.resource::<Layout>().asked.clone() {
                 open(world, path);
@@ -411,6 +410,13 @@ fn open(world: &mut World, path: PathBuf) {
     world.resource_mut::<Log>().say(tr!("opening {}|log", path.display()));
     world.resource_mut::<Layout>().asked = Some(path.clone());
     world.write_message(OpenScene(path));
+}
+
+/// Makes a project of the model that is open, with so many metres a unit, and opens that.
+fn make_project(world: &mut World, metres: Option<f64>) {
+    if let Some(model) = world.get_resource::<CurrentScene>().map(|s| s.0.path.clone()) {
+        world.write_message(OpenAsProject { model, metres });
+    }
 }
 
 fn show_tab(world: &mut World, name: &str) {

@@ -5,7 +5,10 @@ use egui::{Panel as Side, Ui};
 use intrados_scene::LoadError;
 use intrados_stage::{Fault, Jobs};
 
-use crate::{Action, Actions, Log, lang::term};
+use crate::{
+    Action, Actions, Log,
+    lang::{local, term},
+};
 
 /// So many at once; of more, the oldest go. The log has them all.
 const MOST: usize = 3;
@@ -20,6 +23,8 @@ struct Banner {
     details: String,
     /// Whether a world begun anew would help.
     reload: bool,
+    /// Metres per unit in which the model that is open would have the size of a structure.
+    metres: Option<f64>,
 }
 
 /// What has gone wrong lately.
@@ -35,6 +40,7 @@ impl Banners {
             text: term(&error.to_string()),
             details: problems.join("\n"),
             reload: false,
+            metres: None,
         });
     }
 
@@ -45,6 +51,19 @@ impl Banners {
             text: term(why),
             details: format!("{title}: {why}"),
             reload: false,
+            metres: None,
+        });
+    }
+
+    /// A model that is open and has no size that a structure can have, m.
+    pub(crate) fn doubtful(&mut self, name: &str, size: f32, metres: f64) {
+        let text = tr!("{} is {} m across, as glTF is in metres.", name, local(size.to_string()));
+        self.put(Banner {
+            title: tr!("mm or m?"),
+            details: text.clone(),
+            text,
+            reload: false,
+            metres: Some(metres),
         });
     }
 
@@ -56,6 +75,7 @@ impl Banners {
             text: fault.to_string(),
             details: format!("{what}: {fault}\n{place}"),
             reload: true,
+            metres: None,
         });
     }
 
@@ -125,6 +145,18 @@ pub(crate) fn show(ui: &mut Ui, world: &mut World) {
                         .clicked()
                 {
                     asked.push(Action::Reload);
+                }
+                if let Some(metres) = banner.metres {
+                    let name = match metres < 1.0 {
+                        true => tr!("Open it in millimetres"),
+                        false => tr!("Open it 1000 times as large"),
+                    };
+                    let hint = tr!(
+                        "Makes its project, in a folder beside it; the model's file stays as it is"
+                    );
+                    if ui.button(name).on_hover_text(hint).clicked() {
+                        asked.push(Action::Rescale(metres));
+                    }
                 }
                 let mut copy = ui.button(tr!("Copy details"));
                 if let Some(log) = &log {

@@ -14,6 +14,7 @@ use intrados_light::{
 use intrados_predict::Progress;
 use intrados_scene::{
     LoadError,
+    import::likely_unit,
     plugin::{CurrentScene, SceneChanged, SceneFailed},
 };
 use intrados_stage::{Jobs, Pace, catch};
@@ -147,6 +148,9 @@ pub(crate) fn greet(
         fixed(size.y, 2),
         fixed(size.z, 2)
     ));
+    if let Some(metres) = likely_unit(scene) {
+        banners.doubtful(&scene.name, size.max_element(), metres);
+    }
     for warning in &scene.warnings {
         log.say(format!("⚠ {}", term(warning)));
     }
@@ -256,14 +260,15 @@ fn panels(ui: &mut Ui, world: &mut World) {
     });
 }
 
-/// What is going on: jobs, each with its progress and a way to stop it, and what was said last.
+/// What is going on: the newest job with its progress and a way to stop it, the others behind a
+/// button; and what was said last.
 fn status(ui: &mut Ui, world: &mut World) {
     ui.horizontal_centered(|ui| {
         let mut jobs = world.resource_mut::<Jobs>();
         let jobs = jobs.bypass_change_detection();
         let count = jobs.running().len();
         if count > 0 {
-            log::first(ui, jobs);
+            log::newest(ui, jobs);
         }
         if count > 1 {
             ui.menu_button(tr!("and {} more", count - 1), |ui| log::list(ui, jobs));

@@ -124,9 +124,9 @@ pub(crate) fn list(ui: &mut Ui, jobs: &mut Jobs) -> bool {
     !running.is_empty()
 }
 
-/// The first of them alone, in a line that has begun.
-pub(crate) fn first(ui: &mut Ui, jobs: &mut Jobs) {
-    if let Some(job) = jobs.running().first() {
+/// The newest of them alone, in a line that has begun: it is what was asked for last.
+pub(crate) fn newest(ui: &mut Ui, jobs: &mut Jobs) {
+    if let Some(job) = jobs.running().last() {
         row(ui, job);
     }
 }

@@ -45,6 +45,29 @@ pub(crate) fn narrowed(camera: &Camera, fov_deg: f32) -> Camera {
     Camera { position: camera.target + arm, fov_deg, ..camera.clone() }
 }
 
+/// The same direction of view, from so far that all of the box is in the picture, with a little air
+/// about it, below what covers the share `head` of the picture's height. [`Camera::framing`] where
+/// nothing covers it.
+pub(crate) fn framed(camera: &Camera, [low, high]: [Vec3; 2], head: f32) -> Camera {
+    const AIR: f32 = 1.12;
+    let middle = 0.5 * (low + high);
+    let ([right, up, forward], [hx, hy]) = (camera.frame(), camera.half_extent());
+    // At unit distance: how far below the picture's middle that of its free part lies, and half of
+    // the free part's height.
+    let (down, free) = (hy * head, hy * (1.0 - head));
+    let corner = |k: usize| {
+        let end = |i: usize| if k >> i & 1 == 1 { high[i] } else { low[i] };
+        Vec3::from_array(std::array::from_fn(end)) - middle
+    };
+    let needs = |d: Vec3| {
+        let ahead = d.dot(forward);
+        (d.dot(right).abs() / hx).max((d.dot(up) + down * ahead).abs() / free) - ahead
+    };
+    let distance = AIR * (0..8).map(|k| needs(corner(k))).fold(1e-3, f32::max);
+    let target = middle + down * distance * up;
+    Camera { position: target - distance * forward, target, ..camera.clone() }
+}
+
 /// The same view with at most `pixels` pixels.
 pub(crate) fn resized(camera: &Camera, pixels: u32) -> Camera {
     if camera.width as f32 * camera.height as f32 <= pixels as f32 {
@@ -110,6 +133,24 @@ mod tests {
         assert!(
             (to_old.dot(right) / to_old.dot(forward) / panned.half_extent()[0] - 0.5).abs() < 1e-5
         );
+    }
+
+    #[test]
+    fn what_is_framed_lies_below_what_covers_the_picture() {
+        let [low, high] = [Vec3::new(-1.0, 0.0, -6.0), Vec3::new(1.0, 3.0, 2.0)];
+        let from_above = orbit(&camera(), 0.7, 0.5);
+        for (camera, head) in [(camera(), 0.1), (camera(), 0.3), (from_above, 0.2)] {
+            let seen = framed(&camera, [low, high], head);
+            for k in 0..8_usize {
+                let end = |i: usize| if k >> i & 1 == 1 { high[i] } else { low[i] };
+                let corner = Vec3::from_array(std::array::from_fn(end));
+                let at = crate::surface::project(&seen, [400, 200], corner);
+                assert!((0.0..400.0).contains(&at.x), "{at}");
+                assert!((200.0 * head..200.0).contains(&at.y), "{head}: {at}");
+            }
+        }
+        let (free, framing) = (framed(&camera(), [low, high], 0.0), camera().framing([low, high]));
+        assert!(free.position.distance(framing.position) < 1e-4, "{free:?}");
     }
 
     #[test]

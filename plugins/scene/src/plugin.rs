@@ -22,8 +22,13 @@ pub struct OpenScene(pub PathBuf);
 
 /// Asks for a model (glTF, IFC) as a project of its own, in a folder beside it: only there evidence
 /// has a place. One that was made before is opened as it is.
-#[derive(Message, Debug, Clone, PartialEq, Eq)]
-pub struct OpenAsProject(pub PathBuf);
+#[derive(Message, Debug, Clone, PartialEq)]
+pub struct OpenAsProject {
+    /// The model.
+    pub model: PathBuf,
+    /// Metres per unit of it; none: what its format says.
+    pub metres: Option<f64>,
+}
 
 /// Another scene is in [`CurrentScene`], and its entities are there.
 #[derive(Message, Debug, Clone, Copy, PartialEq, Eq)]
@@ -96,17 +101,17 @@ fn start_loading(
     access: Res<Access>,
     mut jobs: ResMut<Jobs>,
 ) {
-    let scene = wishes.read().last().map(|wish| (wish.0.clone(), is_ifc(&wish.0)));
-    let project = projects.read().last().map(|wish| (wish.0.clone(), true));
-    let Some((path, is_imported)) = project.or(scene) else { return };
+    let as_it_is = |wish: &OpenScene| (wish.0.clone(), is_ifc(&wish.0).then(Told::default));
+    let scene = wishes.read().last().map(as_it_is);
+    let told = |metres| Told { metres, ..Told::default() };
+    let project = projects.read().last().map(|wish| (wish.model.clone(), Some(told(wish.metres))));
+    let Some((path, told)) = project.or(scene) else { return };
     let access = access.clone();
-    let task = Task::spawn(&mut jobs, format!("opening {}", path.display()), move |job| {
-        if is_imported {
-            imported(&path, &access, job)
-        } else {
-            Scene::open_within(&path, &access, job)
-        }
-    });
+    let task =
+        Task::spawn(&mut jobs, format!("opening {}", path.display()), move |job| match &told {
+            Some(told) => imported(&path, told, &access, job),
+            None => Scene::open_within(&path, &access, job),
+        });
     *loading.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(task);
 }
 
@@ -117,18 +122,19 @@ fn is_ifc(path: &Path) -> bool {
 
 /// A model that is imported into a folder beside it: `bridge.ifc` into `bridge.intrados`. Where nothing can be written there, the folder lies among the temporary ones.
 /// What was imported before, and may have been edited, is opened as it is.
-fn imported(path: &Path, access: &Access, job: &Job) -> Result<Scene, LoadError> {
-    let beside = path.with_extension("intrados");
+fn imported(path: &Path, told: &Told, access: &Access, job: &Job) -> Result<Scene, LoadError> {
+    // What was made of it in its own unit is another structure.
+    let scaled = if told.metres.is_some() { "scaled." } else { "" };
+    let beside = path.with_extension(format!("{scaled}intrados"));
     // Two models of one name are not to meet there.
     let whole = path.canonicalize().unwrap_or_else(|_| path.into());
     let key = blake3::hash(whole.as_os_str().as_encoded_bytes()).to_hex();
-    let aside = std::env::temp_dir().join(format!("intrados-import-{key}"));
-    let told = Told::default();
+    let aside = std::env::temp_dir().join(format!("intrados-import-{scaled}{key}"));
     for folder in [beside, aside] {
         let scene = folder.join("scene.ron");
         let mut remarks = Vec::new();
         if !scene.exists() {
-            match import(path, &folder, &told, access, &job.part(0.0, 0.9)) {
+            match import(path, &folder, told, access, &job.part(0.0, 0.9)) {
                 Err(ImportError::CannotWrite(_)) => continue,
                 other => remarks = remarks_on(&other?, &folder),
             }
@@ -238,6 +244,54 @@ mod tests {
             (0, 1, 2)
         );
         assert!(app.world_mut().resource_mut::<Jobs>().running().is_empty());
+    }
+
+    #[test]
+    fn a_model_in_millimetres_is_opened_again_in_metres() {
+        use glam::{Mat4, Vec3};
+
+        use crate::{Material, Mesh, Object, Part, gltf, import::likely_unit};
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("block.glb");
+        let write = |size: f32| {
+            let mesh = Mesh {
+                positions: [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z].map(|p| size * p).to_vec(),
+                triangles: vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],
+                ..Mesh::default()
+            };
+            let object = Object {
+                name: "block".into(),
+                mesh: 0,
+                transform: Mat4::IDENTITY,
+                material: 0,
+                member: None,
+                part: Part::Scenery,
+            };
+            let model = gltf::Model {
+                meshes: vec![Arc::new(mesh)],
+                objects: vec![object],
+                materials: vec![Material::default()],
+                ..gltf::Model::default()
+            };
+            gltf::write_glb(&path, &model).unwrap();
+        };
+        let mut app = app();
+        for (size, unit) in [(30.0, None), (3e4, Some(1e-3)), (5e-4, Some(1e3)), (1e7, None)] {
+            write(size);
+            app.world_mut().write_message(OpenScene(path.clone()));
+            assert_eq!(settle(&mut app), (1, 0), "{size}");
+            let scene = app.world().resource::<CurrentScene>().0.clone();
+            assert_eq!(likely_unit(&scene), unit, "{size}");
+        }
+        write(3e4);
+        app.world_mut().write_message(OpenAsProject { model: path, metres: Some(1e-3) });
+        assert_eq!(settle(&mut app), (1, 0));
+        let scene = app.world().resource::<CurrentScene>().0.clone();
+        let [low, high] = scene.bounds();
+        assert!(((high - low).max_element() - 30.0).abs() < 1e-3, "{low} {high}");
+        assert!(scene.path.starts_with(folder.path().join("block.scaled.intrados")));
+        let doubts: Vec<_> = scene.warnings.iter().filter(|w| w.contains("mm or m?")).collect();
+        assert!(likely_unit(&scene).is_none() && doubts.is_empty(), "{doubts:?}");
     }
 
     #[test]

@@ -1,11 +1,11 @@
 //! Tools of the structure's picture and of the sheet, and what is left of a session that broke off.
 
-use std::{fs, path::Path};
+use std::{collections::HashSet, fs, path::Path};
 
 use bevy_ecs::world::World;
 use egui::{Key, Modifiers};
 use egui_kittest::kittest::{NodeT, Queryable};
-use glam::Vec3;
+use glam::{Mat4, Vec3};
 use intrados_forecast::ForecastSettings;
 use intrados_light::Render;
 use intrados_mechanics::plugin::{Analyses, ShownAt};
@@ -13,8 +13,8 @@ use intrados_panels::{
     Action, Latest, Lengths, Log, Look, PanelsPlugin, Refine, Selection, Viewpoint, Workspace,
 };
 use intrados_predict::{PredictSettings, Predicting};
-use intrados_scene::{Camera, plugin::CurrentScene};
-use intrados_stage::Work;
+use intrados_scene::{Camera, Part, Scene, parametric::write_glb, plugin::CurrentScene};
+use intrados_stage::{Job, Jobs, Task, Work};
 
 use super::{LONELY, Window, export, press, rest, type_into, with_column, with_lonely};
 
@@ -131,6 +131,118 @@ fn keys_look_from_the_sides_and_go_through_slices() {
     window.harness.key_press(Key::Num1);
     window.frames(2);
     assert_eq!(window.with(|w| w.resource::<Look>().view), intrados_light::View::Primal);
+}
+
+/// Of a model that nobody builds as large, the unit is asked for, and a click opens it in the other
+/// one.
+#[test]
+fn a_model_in_millimetres_is_opened_in_metres_by_a_click() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let model = folder.path().join("large.glb");
+    let mut scene = Scene::open(Path::new("column"), &Job::default()).expect("a scene");
+    scene.members.clear();
+    for object in &mut scene.objects {
+        (object.name, object.member, object.part) = ("thing".into(), None, Part::Scenery);
+        object.transform = Mat4::from_scale(Vec3::splat(1e3)) * object.transform;
+    }
+    write_glb(&model, &scene).expect("a model");
+    let mut window = Window::new(|_| {});
+    window.ask(Action::Open(model));
+    window.until("a scene", |w| w.contains_resource::<CurrentScene>());
+    window.frames(2);
+    assert!(has(&window, "mm or m?"));
+    window.click("Open it in millimetres");
+    let project = folder.path().join("large.scaled.intrados");
+    window.until("its project", |w| w.resource::<CurrentScene>().0.path.starts_with(&project));
+    window.frames(2);
+    assert!(!has(&window, "mm or m?"));
+    let [low, high] = window.with(|w| w.resource::<CurrentScene>().0.bounds());
+    assert!((high - low).max_element() < 100.0, "{low} {high}");
+}
+
+/// The line at the bottom shows the job that was asked for last, whatever else goes on.
+#[test]
+fn the_newest_job_is_the_one_at_the_bottom() {
+    let mut window = with_column();
+    window.until("rest", |w| {
+        w.resource::<Latest>().result.is_some() && w.resource_mut::<Jobs>().running().is_empty()
+    });
+    let begin = |window: &Window, name: &str| {
+        let wait = |job: &Job| {
+            while job.check().is_ok() {
+                rest();
+            }
+        };
+        window.with(|w| Task::spawn(&mut w.resource_mut::<Jobs>(), name, wait))
+    };
+    let older = begin(&window, "a long report");
+    let newer = begin(&window, "an import");
+    window.frames(2);
+    assert!(has(&window, "an import") && !has(&window, "a long report"));
+    assert!(has(&window, "and 1 more"));
+    drop(newer);
+    window.until("its end", |w| w.resource_mut::<Jobs>().running().len() == 1);
+    window.frames(2);
+    assert!(has(&window, "a long report") && !has(&window, "and 1 more"));
+    drop(older);
+}
+
+/// Where the structure's picture has the colour of what is selected, once nothing moves any more.
+fn accents(window: &mut Window) -> HashSet<(u32, u32)> {
+    window.ask(Action::Tab("Structure"));
+    for _ in 0..40 {
+        window.frame();
+        rest();
+    }
+    let rect = window.harness.get_by_label("Damage of members").rect();
+    let picture = window.picture();
+    let mut marked = HashSet::new();
+    for (x, y, pixel) in picture.enumerate_pixels() {
+        let is_accent = pixel.0.iter().zip([255, 176, 0]).all(|(a, b)| a.abs_diff(b) < 40);
+        if is_accent && rect.contains(egui::pos2(x as f32, y as f32)) {
+            marked.insert((x, y));
+        }
+    }
+    marked
+}
+
+/// Where the slice of the CT tab lies is outlined on its member, and moves with it.
+#[test]
+fn the_slice_that_is_shown_is_outlined_on_its_member() {
+    let mut window = with_column();
+    window.until("the prediction", |w| w.resource::<Latest>().result.is_some());
+    window.ask(Action::Select(Some(1)));
+    window.frames(2);
+    let before = accents(&mut window);
+    let mut shown = |slice: &str, steps: bool| {
+        window.ask(Action::Tab("CT"));
+        window.until_seen("CT slice");
+        if steps {
+            window.ask(Action::StepSlice(true));
+        }
+        for _ in 0..2_000 {
+            window.frame();
+            if has(&window, slice) {
+                break;
+            }
+            rest();
+        }
+        accents(&mut window)
+    };
+    let [first, second] = [("slice 1 of", false), ("slice 2 of", true)].map(|(s, n)| shown(s, n));
+    assert!(first.difference(&before).count() > 20, "{} of {}", first.len(), before.len());
+    let height = |of: &HashSet<(u32, u32)>, without: &HashSet<(u32, u32)>| {
+        let own: Vec<u32> = of.difference(without).map(|(_, y)| *y).collect();
+        assert!(own.len() > 10, "{} of {}", own.len(), of.len());
+        own.iter().sum::<u32>() as f32 / own.len() as f32
+    };
+    let heights = [height(&first, &second), height(&second, &first)];
+    assert!((heights[0] - heights[1]).abs() > 3.0, "{heights:?}");
+    // Where no member is selected, no slice is shown.
+    window.ask(Action::Select(None));
+    window.frames(2);
+    let none = accents(&mut window);
+    assert!(none.len() < 10, "{}", none.len());
 }
 
 /// Through a tunnel the camera flies along its axis and halts where it is told to; however it ends,

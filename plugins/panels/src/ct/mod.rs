@@ -20,6 +20,7 @@ use intrados_stage::{Estimate, Jobs, Task};
 use intrados_xray::plugin::{Scan, Scans};
 use plots::Order;
 use probe::{Drawn, Found, Probe};
+pub(crate) use source::Plane;
 use source::{Read, Source};
 
 use crate::{
@@ -109,6 +110,13 @@ impl Ct {
     /// Puts the tool away with what it has drawn; false if there was none.
     pub(crate) fn end_tool(&mut self) -> bool {
         std::mem::take(&mut self.probe).is_on()
+    }
+
+    /// Where the slice lies that was shown last, if it is one of this member.
+    pub(crate) fn plane(&self, scene: &Scene, member: usize) -> Option<Plane> {
+        let ((hash, of, ..), _) = self.of.as_ref()?;
+        let shown = self.shown.as_ref()?.as_ref().ok()?;
+        shown.read.plane.filter(|_| *hash == scene.hash && *of == member)
     }
 
     fn method(&self) -> Method {

@@ -1,12 +1,13 @@
 //! Where slices come from, and what is read of one.
 
+use glam::Vec3;
 use intrados_ct::{
     detect::{DetectSettings, Detection, Method, detect},
     slice::Slice,
     source::{Known, Origin, SliceRead, SliceShelf, SliceSource},
     synthetic::scanned::layer,
 };
-use intrados_scene::Scene;
+use intrados_scene::{AxisRuns, Scene};
 use intrados_stage::{Estimate, Job, alone};
 use intrados_xray::plugin::Scanned;
 
@@ -39,6 +40,34 @@ pub(super) fn scanned(scan: &Scanned) -> Vec<(String, Source)> {
         .collect()
 }
 
+/// Where a slice lies in the structure.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Plane {
+    /// A point of it, m.
+    pub(crate) at: Vec3,
+    /// Unit, across it.
+    pub(crate) normal: Vec3,
+}
+
+impl Plane {
+    /// Of a slice across its member, `offset_m` from the place of its core along the axis. How
+    /// others are turned about the axis, nobody knows.
+    fn across(scene: &Scene, source: &SliceSource, offset_m: f64) -> Option<Self> {
+        let frame = scene.members.get(source.member)?.frame;
+        let normal = frame.axis.try_normalize()?;
+        let along = source.along().filter(|_| source.axis() == Some(AxisRuns::Through))?;
+        Some(Self { at: frame.point(along as f32) + offset_m as f32 * normal, normal })
+    }
+
+    /// Of slice `z` of a scan.
+    fn scanned(scan: &Scanned, z: usize) -> Option<Self> {
+        let place = scan.acquisition.target.place?;
+        let normal = place.axes[2];
+        let at = place.origin + scan.restored.volume.grid.at(2, z) * normal;
+        Some(Self { at: at.as_vec3(), normal: normal.as_vec3() })
+    }
+}
+
 /// A slice, and what was found in it.
 pub(super) struct Read {
     pub(super) slice: Slice,
@@ -50,6 +79,8 @@ pub(super) struct Read {
     pub(super) matrix: f32,
     /// Pore area over body area as it was planted, where that is known.
     pub(super) truth: Option<f64>,
+    /// Where it lies; none: nobody knows.
+    pub(super) plane: Option<Plane>,
 }
 
 /// Reads one slice, in a thread of its own: the frame's passes must not wait for it.
@@ -61,8 +92,8 @@ pub(super) fn read(
     job: &Job,
 ) -> Result<Read, String> {
     alone(|| {
-        let (slice, found, truth) = load(scene, source, method, shelf, job)?;
-        Ok(Read::of(slice, found, truth))
+        let (slice, found, truth, plane) = load(scene, source, method, shelf, job)?;
+        Ok(Read { plane, ..Read::of(slice, found, truth) })
     })
 }
 
@@ -80,7 +111,10 @@ pub(super) fn profile(
         let quiet = Job::default();
         for (k, source) in sources.iter().enumerate() {
             job.step(k, sources.len()).map_err(|e| e.to_string())?;
-            tell(k, load(scene, source, method, shelf, &quiet).map(|(_, found, _)| found.porosity));
+            tell(
+                k,
+                load(scene, source, method, shelf, &quiet).map(|(_, found, ..)| found.porosity),
+            );
         }
         Ok(())
     })
@@ -101,27 +135,27 @@ impl Source {
     }
 }
 
-/// The slice, what was found in it, and its planted porosity where it was made.
+/// The slice, what was found in it, its planted porosity where it was made, and where it lies.
 fn load(
     scene: &Scene,
     source: &Source,
     method: Method,
     shelf: &SliceShelf,
     job: &Job,
-) -> Result<(Slice, Detection, Option<f64>), String> {
+) -> Result<(Slice, Detection, Option<f64>, Option<Plane>), String> {
     let how = source.settings(method);
     match source {
         Source::Told(source) => {
-            let SliceRead { slice, found, known, .. } =
+            let SliceRead { slice, found, known, offset_m, .. } =
                 source.read(scene, &how, shelf, job).map_err(|e| e.to_string())?;
             let made = known.filter(|k| !matches!(k, Known::Labels(_)));
             let truth = made.map(|known| known.truth(&found, &how).0);
-            Ok((slice, found, truth))
+            Ok((slice, found, truth, Plane::across(scene, source, offset_m)))
         }
         Source::Taken(scan, z) => {
             let layer = layer(&scan.acquisition, &scan.restored, *z);
             let found = detect(&layer.slice, &how, job).map_err(|e| e.to_string())?;
-            Ok((layer.slice, found, Some(layer.porosity)))
+            Ok((layer.slice, found, Some(layer.porosity), Plane::scanned(scan, *z)))
         }
     }
 }
@@ -147,7 +181,7 @@ impl Read {
             let at = (v - range[0]) / (range[1] - range[0]) * BINS as f32;
             histogram[(at.max(0.0) as usize).min(BINS - 1)] += 1.0 / body.len() as f64;
         }
-        Self { slice, found, range, histogram, matrix, truth }
+        Self { slice, found, range, histogram, matrix, truth, plane: None }
     }
 
     /// Name, size and porosity.

@@ -6,6 +6,7 @@ mod measure;
 mod model;
 mod section;
 mod settled;
+mod slice;
 mod spot;
 mod time;
 
@@ -26,12 +27,16 @@ pub(crate) use spot::Spot;
 use crate::{
     Action, Actions, Latest, Selection,
     attach::Form,
+    ct::Ct,
     history::{Earlier, History},
     lang::fixed,
     moment::{Courses, Moment, Seen, Timeline},
     play::Play,
     saving::Saving,
 };
+
+/// What one row of tools covers at the head of the picture, with a little air, points.
+const TOOLS: f32 = 48.0;
 
 /// Where the structure is looked at from.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -106,7 +111,7 @@ pub(crate) struct Structure {
 impl Default for Structure {
     fn default() -> Self {
         Self {
-            model: model::Model::default(),
+            model: model::Model::below(TOOLS),
             earlier: model::Model::earlier(),
             names: true,
             section: None,
@@ -263,6 +268,7 @@ pub(crate) fn structure(
     mut light: Light<'_>,
     mut form: ResMut<Form>,
     saving: Res<Saving>,
+    ct: Res<Ct>,
     mut jobs: ResMut<Jobs>,
     mut actions: ResMut<Actions>,
 ) {
@@ -327,6 +333,11 @@ pub(crate) fn structure(
     }
     structure.earlier.follow(&pointed.camera);
     compass::draw(ui, rect, &pointed.camera);
+    let sliced = selection.0.and_then(|member| Some((member, ct.plane(scene, member)?)));
+    if let Some((member, plane)) = sliced {
+        let triangles = structure.model.triangles(member);
+        slice::draw(ui, rect, &pointed.camera, triangles, plane);
+    }
     structure.tape.draw(ui, rect, &pointed.camera);
     structure.place.iter().for_each(|at| measure::end(ui, rect, &pointed.camera, *at));
     let shown = Shown { latest: &latest, seen: &seen, when };
@@ -339,7 +350,7 @@ pub(crate) fn structure(
         return;
     }
     let bar = Rect::from_min_size(whole.min + vec2(8.0, 8.0), vec2(whole.width() - 16.0, 24.0));
-    ui.scope_builder(egui::UiBuilder::new().max_rect(bar), |ui| {
+    let drawn = ui.scope_builder(egui::UiBuilder::new().max_rect(bar), |ui| {
         ui.vertical(|ui| {
             let timeline = &courses.timeline;
             let time = (&mut moment, timeline, play.is_on);
@@ -351,6 +362,7 @@ pub(crate) fn structure(
             flown(ui, structure, scene, *selection, &mut actions);
         });
     });
+    structure.model.cover((drawn.response.rect.bottom() + 8.0 - whole.top()).max(TOOLS));
 }
 
 /// The way out of a picture with nothing in it.

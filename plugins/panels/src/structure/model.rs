@@ -44,6 +44,9 @@ const PARALLEL: f32 = 1.0;
 /// Pixels that are drawn within a frame.
 const COARSE: f64 = 4e5;
 
+/// Share of the picture's height that is kept free for tools at most.
+const MOST_COVERED: f32 = 0.4;
+
 /// Width of the legend, points.
 const LEGEND: f32 = 92.0;
 
@@ -93,6 +96,8 @@ pub(super) struct Model {
     flies: bool,
     /// Nobody wants to see the scale of colours.
     hides_legend: bool,
+    /// What tools cover at the head of the picture, points: what is framed lies below.
+    head: f32,
     /// The fine picture that is being drawn, and what of.
     coming: Option<(Key, Task<Painted>)>,
 }
@@ -158,6 +163,11 @@ impl Model {
         Self { of_what: Of::Bare, ..Self::default() }
     }
 
+    /// Of what is known now, below tools of so many points.
+    pub(super) fn below(head: f32) -> Self {
+        Self { head, ..Self::default() }
+    }
+
     /// Of what was known at first.
     pub(super) fn earlier() -> Self {
         Self { of_what: Of::Earlier, ..Self::default() }
@@ -196,7 +206,7 @@ impl Model {
         });
         let camera = match &self.camera {
             Some(camera) => Camera { width, height, ..camera.clone() },
-            None => first(&self.positions, scene, [width, height]),
+            None => first(&self.positions, scene, [width, height], self.head),
         };
         let before = camera.clone();
         let begun = ui.input(|i| i.pointer.press_origin()).and_then(|at| self.spot(at));
@@ -252,6 +262,11 @@ impl Model {
         self.slides = along;
     }
 
+    /// From now on tools cover so many points at the head of the picture.
+    pub(super) fn cover(&mut self, head: f32) {
+        self.head = head;
+    }
+
     /// Whether the camera flies by itself.
     pub(super) fn fly(&mut self, flies: bool) {
         self.flies = flies;
@@ -294,8 +309,8 @@ impl Model {
         let camera = self.camera.take().filter(|_| is_alike);
         let facets = Arc::new(facets);
         let (of, of_what) = (scene.hash.clone(), self.of_what);
-        let slides = self.slides;
-        *self = Self { of_what, of, facets, positions, camera, slides, ..Self::default() };
+        let (slides, head) = (self.slides, self.head);
+        *self = Self { of_what, of, facets, positions, camera, slides, head, ..Self::default() };
     }
 
     /// Looks from another place, so that what is wanted fills the picture.
@@ -309,13 +324,13 @@ impl Model {
         let from = match view {
             super::View::Framed => camera.position - camera.target,
             super::View::Home => {
-                let home = first(&self.positions, scene, [camera.width, camera.height]);
+                let home = first(&self.positions, scene, [camera.width, camera.height], self.head);
                 home.position - home.target
             }
             super::View::Along(axis) => axis,
         };
         let placed = Camera { position: from, target: Vec3::ZERO, ..camera.clone() };
-        self.camera = Some(placed.framing(bounds(&points)));
+        self.camera = Some(framed(&placed, bounds(&points), self.head));
     }
 
     /// What members are called and how they fare, the worst first where names would overlap.
@@ -559,8 +574,14 @@ fn ink(drawn: &mut Drawn, facets: &[Facet], selection: Selection) {
     }
 }
 
+/// Frames a box below tools that cover so many points at the head of the picture.
+fn framed(camera: &Camera, low_high: [Vec3; 2], head: f32) -> Camera {
+    let share = head / camera.height.max(1) as f32;
+    orbit::framed(camera, low_high, share.clamp(0.0, MOST_COVERED))
+}
+
 /// From the scene's own camera's side, so that all members are seen.
-fn first(positions: &[Vec3], scene: &Scene, [width, height]: [u32; 2]) -> Camera {
+fn first(positions: &[Vec3], scene: &Scene, [width, height]: [u32; 2], head: f32) -> Camera {
     let (low_high, theirs) = (bounds(positions), scene.cameras.first());
     let position = theirs.map_or(Vec3::new(0.9, 0.45, 1.1), |c| c.position - c.target);
     let camera = Camera {
@@ -574,7 +595,7 @@ fn first(positions: &[Vec3], scene: &Scene, [width, height]: [u32; 2]) -> Camera
         exposure: 0.0,
         lens: None,
     };
-    camera.framing(low_high)
+    framed(&camera, low_high, head)
 }
 
 fn colour(value: f32) -> [u8; 3] {

@@ -72,6 +72,8 @@ const MAX_DEPTH: usize = 256;
 
 /// What is noted of members whose concrete nobody states, behind their number.
 pub(crate) const NO_CLASS: &str = "members state no concrete class";
+/// What is noted of a model whose size is doubted, behind it.
+pub(crate) const NO_UNIT: &str = "mm or m? glTF is in metres";
 
 /// A model in memory, in the types of a scene: what a glTF file brings to it, and what
 /// [`write_glb`] writes.

@@ -148,6 +148,21 @@ const SIZES: std::ops::RangeInclusive<f64> = 1e-3..=2e3;
 /// No member is longer than this, m.
 const LONGEST: f32 = 2e3;
 
+/// Metres per unit that a glTF file most likely is in, where it is opened as it is and no structure
+/// is as large: it was written in millimetres, or scaled down once too often. None: its size is one
+/// that a structure can have, or no such unit makes it one.
+#[must_use]
+pub fn likely_unit(scene: &Scene) -> Option<f64> {
+    let is_gltf = |e: &std::ffi::OsStr| ["glb", "gltf"].iter().any(|g| e.eq_ignore_ascii_case(g));
+    if !scene.path.extension().is_some_and(is_gltf) || scene.objects.is_empty() {
+        return None;
+    }
+    let [low, high] = scene.bounds();
+    let size = f64::from((high - low).max_element());
+    let metres = if size > *SIZES.end() { 1e-3 } else { 1e3 };
+    (!SIZES.contains(&size) && SIZES.contains(&(metres * size))).then_some(metres)
+}
+
 /// Imports a model into `folder`, which must be empty or not there yet.
 ///
 /// # Errors
@@ -169,7 +184,7 @@ pub fn import(
     }
     let (source, model) = match extension.as_str() {
         "ifc" => (convert::ifc(path, &job.part(0.0, 0.8))?, crate::gltf::Model::default()),
-        "glb" | "gltf" => model::gltf(path, metres, access, job)?,
+        "glb" | "gltf" => model::gltf(path, told.metres, access, job)?,
         "obj" => model::obj(path, metres)?,
         _ => {
             // A missing file is missing whatever its name is.

@@ -20,10 +20,11 @@ const LONGEST_OBJ: u64 = 1 << 30;
 /// A glTF file: the model, and its members and other objects as elements.
 pub(super) fn gltf(
     path: &Path,
-    metres: f64,
+    told: Option<f64>,
     access: &Access,
     job: &Job,
 ) -> Result<(Source, Model), ImportError> {
+    let metres = told.unwrap_or(1.0);
     let mut model = gltf::import_within(path, access, &job.part(0.0, 0.5))
         .map_err(|e| ImportError::Load(LoadError::of_import(path, e)))?;
     scale(&mut model, metres);
@@ -55,10 +56,12 @@ pub(super) fn gltf(
     let source = Source {
         format: "glTF".into(),
         project: path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default(),
-        // Which classes are assumed, the scene says that is made of it.
+        // Which classes are assumed, the scene says that is made of it; and of a size that was
+        // doubted in metres nothing is left to say once the unit is told.
         notes: std::mem::take(&mut model.warnings)
             .into_iter()
             .filter(|note| !note.contains(gltf::NO_CLASS))
+            .filter(|note| told.is_none() || !note.contains(gltf::NO_UNIT))
             .collect(),
         elements,
         metres_per_unit: metres,

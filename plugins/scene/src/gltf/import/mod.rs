@@ -17,7 +17,7 @@ use self::{
     member::{Identity, Members, Properties, Standing},
 };
 use super::{
-    MAX_DEPTH, Model,
+    MAX_DEPTH, Model, NO_UNIT,
     document::Document,
     json::{Json, as_index},
     problem::{
@@ -518,7 +518,7 @@ impl<'a> Builder<'a> {
         }
         let size = (bounds[1] - bounds[0]).max_element();
         if !(1e-3..=2e3).contains(&size) {
-            self.notes.push(format!("the model is {size} m large: mm or m? glTF is in metres"));
+            self.notes.push(format!("the model is {size} m large: {NO_UNIT}"));
         }
         let far = bounds[0].abs().max(bounds[1].abs()).max_element();
         if far > 1e5 {
