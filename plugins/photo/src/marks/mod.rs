@@ -1,10 +1,10 @@
 //! Damage that is seen in a photograph: which pixels show a crack, missing cover, bared steel,
 //! rust, efflorescence.
 //!
-//! Two small U-Nets look at the picture, one for cracks first of all and one for all else. They were
-//! trained by [`train`] on rendered pictures alone ([`lesson`]): no photograph was shown to them, and only the
-//! thresholds of cracks were chosen on some. `plugins/photo/assets` holds the weights and how they came
-//! to be.
+//! Two small U-Nets look at the picture, one for cracks first of all and one for all else. They
+//! were trained by [`train`] on rendered pictures alone ([`lesson`]): no photograph was shown to
+//! them, and only the thresholds of cracks were chosen on some. `plugins/photo/assets` holds the
+//! weights and how they came to be.
 
 mod camera;
 pub mod lesson;
@@ -231,15 +231,15 @@ impl Reader {
             looks.extend(self.cracks.look(&sight, known, [Mark::Crack], tile, job)?);
             farther = halved(light, known);
         }
-        let areas = of_one.iter().zip(&of_other).map(|(one, other)| between(one, other));
+        let areas = of_one.iter().zip(&of_other).map(|(one, other)| agreed(one, other));
         let mut grids = std::iter::once(together(looks, known)).chain(areas);
         let empty = || Grid::new(0, 0, 0.0);
         Ok(Marks { grids: std::array::from_fn(|_| grids.next().unwrap_or_else(empty)) })
     }
 }
 
-/// Halfway between two probabilities: the mean of their logits.
-fn between(one: &Grid<f32>, other: &Grid<f32>) -> Grid<f32> {
+/// What two networks say together: the mean of their logits.
+fn agreed(one: &Grid<f32>, other: &Grid<f32>) -> Grid<f32> {
     let mean = |(a, b): (&f32, &f32)| {
         let [is, is_not] = [a * b, (1.0 - a) * (1.0 - b)].map(f32::sqrt);
         is / (is + is_not).max(1e-12)
