@@ -48,6 +48,7 @@ fn a_bar_is_pulled_out() {
         name: "bar".into(),
         pieces,
         area,
+        diameter,
         kind: SteelKind::Bar(bar),
         rust: None,
         gone: Vec::new(),

@@ -6,7 +6,7 @@ use super::{Case, DeckError, locate, unfit};
 use crate::{
     element::{embed::embed, rod::Piece},
     mesh::{ElementId, Locator},
-    model::{Action, Matter, Steel, SteelKind},
+    model::{Action, Matter, Steel, SteelKind, round},
     read::Deck,
 };
 
@@ -65,6 +65,7 @@ impl Case {
                 name,
                 pieces,
                 area,
+                diameter: round(area),
                 kind: SteelKind::Stressed(steel, stress),
                 rust: None,
                 gone: Vec::new(),

@@ -22,8 +22,8 @@
 //! the more presses across it (`tensile`); each plane is asked for its share of that, by its tension
 //! over the largest. (One damage for all directions is driven by the modified von Mises strain, by
 //! which pure shear cracks at √(k/3), some 1.9 of the tensile strength.)
-//! Bars keep cracks apart: within a brick there are as many as their bond makes, each with its own
-//! energy and width ([`Step::bars`]).
+//! Bars keep cracks apart: a brick has as many as their bond makes, each with its own energy and
+//! width, be it larger than they are apart or smaller ([`Step::ties`]).
 //! Compression is crushed by the part of the stress that presses: σ = σ⁺ + (1 − d_c) σ⁻ (Faria,
 //! Oliver and Cervera 1998). Cracks that are open across it weaken it (Vecchio and Collins 1986, see
 //! `softened`). Creep is driven by the stress before crushing.
@@ -380,7 +380,7 @@ impl Concrete {
             true => before.axes,
             false => before.turned(&effective),
         };
-        let bands = axes.map(|n| self.along(&n, step).min(step.spacing(&n)));
+        let bands = axes.map(|n| step.ties.band(&n, self.along(&n, step), clock.aged.fctm));
         let laws = bands.map(|band| {
             Knee::of(self.elastic.modulus, clock.aged.fctm, self.properties.fracture_energy, band)
         });
@@ -610,14 +610,14 @@ mod tests {
     use super::super::DAY;
     use super::super::Error;
     use super::super::concrete::{Class, Code, Given, Properties};
-    use super::super::law::{Cracks, Setting};
+    use super::super::law::{Cracks, Setting, Ties};
     use super::*;
     use crate::tensor::tests::{largest, random};
 
     const E: f64 = 30e9;
     const NU: f64 = 0.2;
     const NOW: Step =
-        Step { from: 0.0, to: 0.0, temperature: [293.15; 2], edges: None, bars: [0.0; 3] };
+        Step { from: 0.0, to: 0.0, temperature: [293.15; 2], edges: None, ties: Ties::NONE };
 
     fn c30() -> Properties {
         Given { code: Code::Ec2, ..Given::from("C30/37".parse::<Class>().unwrap()) }

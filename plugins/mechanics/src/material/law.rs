@@ -156,8 +156,36 @@ pub struct Step {
     /// Edges of the element, m: the columns of twice its mean Jacobian. None: a size whatever the
     /// direction, [`Setting::size`].
     pub edges: Option<Edges>,
-    /// How many cracks a metre bars keep apart, along each axis, 1/m; 0 without bars.
-    pub bars: [f64; 3],
+    /// What bars do to the cracks of the element.
+    pub ties: Ties,
+}
+
+/// What bars do to the cracks that run across them, along each axis; zero without bars.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ties {
+    /// How many cracks a metre their bond makes, 1/m.
+    pub cracks: [f64; 3],
+    /// What they bear when they yield, over the section of the concrete, Pa.
+    pub yielding: [f64; 3],
+}
+
+impl Ties {
+    /// No bars.
+    pub const NONE: Self = Self { cracks: [0.0; 3], yielding: [0.0; 3] };
+
+    /// The length along a unit direction that is there for one crack, m, in an element that reaches
+    /// over `reach`, of concrete that bears `fctm` (Pa): as far apart as bond keeps cracks if bars
+    /// bear what the concrete bore, so that more than one crack opens; the element itself if they
+    /// do not, since then one takes the strain of all, but no more than bond would leave it; in
+    /// between by the share that they bear. Spacing of bars two ways: 1/s = |cos θ|/s₁ + |sin θ|/s₂
+    /// (Vecchio and Collins 1986).
+    #[must_use]
+    pub(super) fn band(&self, n: &[f64; 3], reach: f64, fctm: f64) -> f64 {
+        let cracks: f64 = n.iter().zip(self.cracks).map(|(n, cracks)| n.abs() * cracks).sum();
+        let bears: f64 = n.iter().zip(self.yielding).map(|(n, bears)| n * n * bears).sum();
+        let share = (bears / fctm.max(1.0)).min(1.0);
+        1.0 / (share * cracks + (1.0 - share) * cracks.max(1.0 / reach))
+    }
 }
 
 /// Three edges of a parallelepiped, m.
@@ -173,18 +201,11 @@ pub fn reach(edges: &Edges, n: &[f64; 3]) -> f64 {
 }
 
 impl Step {
-    /// How far apart bars keep the cracks that open along a unit direction, m; infinite without
-    /// bars. Of bars two ways |cos θ|/s₁ + |sin θ|/s₂ (Vecchio and Collins 1986).
-    #[must_use]
-    pub(super) fn spacing(&self, n: &[f64; 3]) -> f64 {
-        1.0 / n.iter().zip(self.bars).map(|(n, bars)| n.abs() * bars).sum::<f64>()
-    }
-
     /// A step at 20 °C.
     #[must_use]
     #[cfg(test)]
     pub(crate) fn between(from: f64, to: f64) -> Self {
-        Self { from, to, temperature: [293.15; 2], edges: None, bars: [0.0; 3] }
+        Self { from, to, temperature: [293.15; 2], edges: None, ties: Ties::NONE }
     }
 }
 
@@ -625,8 +646,29 @@ mod tests {
         Concrete::new(p, Setting::long_term(0.05, creep)).unwrap()
     }
 
+    /// Bars that bear what the concrete bore spread its cracks, be the element larger or smaller;
+    /// weak ones do not, and along no bar an element has a crack of its own.
+    #[test]
+    fn bars_keep_cracks_apart_if_they_bear_what_the_concrete_bore() {
+        let ties = |yielding| Ties { cracks: [10.0, 0.0, 0.0], yielding: [yielding, 0.0, 0.0] };
+        let band = |yielding, n: [f64; 3], reach| ties(yielding).band(&n, reach, 3e6);
+        let (x, y) = ([1.0, 0.0, 0.0], [0.0, 1.0, 0.0]);
+        for (yielding, n, reach, expected) in [
+            (5e6, x, 0.02, 0.1),
+            (5e6, x, 0.3, 0.1),
+            (0.0, x, 0.3, 0.1),
+            (0.0, x, 0.02, 0.02),
+            (1.5e6, x, 0.02, 1.0 / 30.0),
+            (5e6, y, 0.02, 0.02),
+            (5e6, [0.8, 0.6, 0.0], 0.02, 1.0 / 8.0),
+        ] {
+            let found = band(yielding, n, reach);
+            assert!((found / expected - 1.0).abs() < 1e-12, "{yielding} {n:?} {reach}: {found}");
+        }
+    }
+
     const NOW: Step =
-        Step { from: 0.0, to: 0.0, temperature: [293.15; 2], edges: None, bars: [0.0; 3] };
+        Step { from: 0.0, to: 0.0, temperature: [293.15; 2], edges: None, ties: Ties::NONE };
 
     /// The strain at which the stress along x is `stress` and nothing else acts; none if no
     /// equilibrium is found.
@@ -901,7 +943,7 @@ mod tests {
             to: 3600.0,
             temperature: [293.15, 313.15],
             edges: None,
-            bars: [0.0; 3],
+            ties: Ties::NONE,
         };
         let free =
             law.respond(&tensor::isotropic(p.expansion * 20.0), &law.born(0.0, 28.0 * DAY), &step);
@@ -947,7 +989,7 @@ mod tests {
                     to,
                     temperature: [283.0 + f64::from(k % 20), 284.0 + f64::from(k % 20)],
                     edges: None,
-                    bars: [0.0; 3],
+                    ties: Ties::NONE,
                 };
                 let answer = law.respond(&strain, &state, &step);
                 assert!(

@@ -9,7 +9,7 @@ use crate::{
     element::embed::embed,
     material::steel::Bar,
     mesh::Locator,
-    model::{Matter, Plate, Steel, SteelKind, Tendon},
+    model::{Matter, Plate, Steel, SteelKind, Tendon, round},
 };
 
 /// Pressure under a plate at jacking, over the mean strength of the concrete then. EN 1992-1-1
@@ -162,6 +162,7 @@ impl Draft<'_> {
             name,
             pieces,
             area,
+            diameter: round(area),
             kind: SteelKind::Bar(bar),
             rust: None,
             gone: Vec::new(),

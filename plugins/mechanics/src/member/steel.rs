@@ -23,7 +23,7 @@ use crate::{
         steel::{Bar, Relaxation, Strand},
     },
     mesh::{HexFace, Locator, Mesh, voxel::distance::Triangles},
-    model::{Matter, Rust, Slipping, Steel, SteelKind, Tendon},
+    model::{Matter, Rust, Slipping, Steel, SteelKind, Tendon, round},
     prestress::{self, Jack, Path},
 };
 
@@ -125,6 +125,7 @@ impl Draft<'_> {
                 name,
                 pieces,
                 area: 0.25 * PI * diameter.powi(2),
+                diameter,
                 kind: SteelKind::Bar(bar),
                 rust,
                 gone: Vec::new(),
@@ -161,6 +162,7 @@ impl Draft<'_> {
             name,
             pieces,
             area: tendon.area,
+            diameter: round(tendon.area),
             kind,
             rust: None,
             gone: Vec::new(),

@@ -7,7 +7,7 @@ use crate::{
     material::{
         DAY,
         concrete::Properties,
-        law::{Concrete, Cracks, Edges, Setting, State, Step},
+        law::{Concrete, Cracks, Edges, Setting, State, Step, Ties},
         steel::Bar,
     },
     mesh::{ElementId, Mesh},
@@ -140,8 +140,8 @@ pub(super) struct Moment {
     pub(super) neutral: f64,
     /// Edges of the brick, m.
     pub(super) edges: Edges,
-    /// Cracks that its bars keep apart, along each axis, 1/m.
-    pub(super) bars: [f64; 3],
+    /// What bars do to the brick's cracks.
+    pub(super) ties: Ties,
     /// Of the excess of the last equilibrium so much becomes damage, whatever the strain
     /// is now; none: damage is found.
     pub(super) growth: Option<f64>,
@@ -268,7 +268,7 @@ impl Law {
                     to: moment.span[1],
                     temperature: moment.temperature,
                     edges: Some(moment.edges),
-                    bars: moment.bars,
+                    ties: moment.ties,
                 };
                 let grown = moment
                     .growth

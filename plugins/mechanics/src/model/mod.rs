@@ -15,6 +15,7 @@ mod stability;
 mod steel;
 mod structure;
 mod thin;
+mod ties;
 
 #[cfg(test)]
 mod tests;
@@ -27,7 +28,7 @@ pub use law::{Elastic, Matter, Memory, Record};
 pub use linear::Linear;
 pub use march::{Control, Drive, Failure, March, MarchSettings, Step};
 pub use nonlocal::Regularisation;
-pub(crate) use steel::JACKING;
+pub(crate) use steel::{JACKING, round};
 pub use steel::{Piecework, Rust, Slipping, Steel, SteelKind, Tendon};
 pub(crate) use structure::Trial;
 pub use structure::{Point, System};

@@ -19,6 +19,8 @@ pub struct Steel {
     pub pieces: Vec<Piece>,
     /// Cross-section, m².
     pub area: f64,
+    /// Of each of the bars that it stands for, m.
+    pub diameter: f64,
     /// What it is.
     pub kind: SteelKind,
     /// What takes its section; none: nothing.
@@ -111,6 +113,11 @@ pub struct Piecework {
     pub stress: f64,
     /// Of bond at its ends.
     pub bond: [BondState; 2],
+}
+
+/// Diameter of a bar with this section (m²), m.
+pub(crate) fn round(area: f64) -> f64 {
+    (4.0 * area / std::f64::consts::PI).sqrt()
 }
 
 /// How long jacking takes, s.
@@ -252,6 +259,7 @@ mod tests {
             name: "bar".into(),
             pieces,
             area: 5e-5,
+            diameter: 8e-3,
             kind,
             rust: Some(rust),
             gone: Vec::new(),

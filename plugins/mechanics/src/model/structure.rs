@@ -12,6 +12,7 @@ use super::{
     march::Failure,
     slip::Slips,
     thin::Rotations,
+    ties,
 };
 use crate::{
     element::{
@@ -22,6 +23,7 @@ use crate::{
         quad::Quadrature,
         turn::Turn,
     },
+    material::law::Ties,
     mesh::{ElementId, HexFace},
     sparse::{BlockMatrix, Connectivity, Pattern, Place},
     tensor::{self, Tangent, Voigt},
@@ -42,8 +44,8 @@ pub struct System<'m> {
     pieces: Vec<(u32, u32)>,
     /// Share of each brick that is concrete: steel displaces the rest.
     concrete: Vec<f64>,
-    /// Cracks that the bars of each brick keep apart, along each axis, 1/m.
-    bars: Vec<[f64; 3]>,
+    /// What bars do to the cracks of each brick.
+    ties: Vec<Ties>,
     /// Since when each joint has a brick on both sides, s.
     joined: Vec<f64>,
     pattern: Arc<Pattern>,
@@ -167,7 +169,7 @@ impl<'m> System<'m> {
             bonded,
             pieces,
             concrete,
-            bars: crossed(model),
+            ties: ties::ties(model),
             joined,
             pattern,
             rotations,
@@ -685,7 +687,7 @@ impl<'m> System<'m> {
                 temperature: warm.map(|warm| neutral + warm.map_or(0.0, here)),
                 neutral,
                 edges,
-                bars: self.bars[hex],
+                ties: self.ties[hex],
                 growth: trial.growth,
                 nonlocal: nonlocal.map(here),
             };
@@ -785,24 +787,6 @@ impl<'m> System<'m> {
     pub(super) fn of_hex(&self, hex: usize, source: ElementError) -> Failure {
         Failure::Element { element: self.model.mesh.name(ElementId::Hex(hex as u32)), source }
     }
-}
-
-/// How many cracks a metre the bars of each brick keep apart, along each axis: 5.4 ρ/φ, since
-/// bond of 1.8 f_ct along l hands a crack's tension to the concrete beside it, ρ 4 · 1.8 l/φ = 1,
-/// and cracks lie 2 l apart at most, two thirds of that in the mean (MC2010, 7.6.4.4, without cover).
-fn crossed(model: &Model) -> Vec<[f64; 3]> {
-    let mut cracks = vec![[0.0; 3]; model.mesh.hexes.len()];
-    for steel in model.steel.iter().filter(|s| matches!(s.kind, super::SteelKind::Bar(_))) {
-        let diameter = (4.0 * steel.area / std::f64::consts::PI).sqrt();
-        for piece in &steel.pieces {
-            let volume = model.mesh.hex_volume(piece.host as u32);
-            let along = (piece.ends[1] - piece.ends[0]).abs().to_array();
-            for (sum, along) in cracks[piece.host].iter_mut().zip(along) {
-                *sum += 5.4 * steel.area * along / (volume * diameter);
-            }
-        }
-    }
-    cracks
 }
 
 /// Of each brick the share that no steel displaces; what is more steel than concrete counts as half.
