@@ -48,6 +48,9 @@ pub struct Setting {
     pub cracks: Cracks,
     /// Whether planes that are open make concrete weaker along them (`cracks::softened`).
     pub transverse: bool,
+    /// Whether concrete that is being crushed swells across (`cracks::swollen`), so that hoops
+    /// confine it.
+    pub swells: bool,
     /// Creep and shrinkage, or none.
     pub creep: Option<Creep>,
     /// Creep by this chain, whatever `creep` says.
@@ -80,6 +83,7 @@ impl Setting {
             spread: None,
             cracks: Cracks::Diffuse,
             transverse: true,
+            swells: std::env::var_os("SWELL").is_some(),
             creep: None,
             chain: None,
             ageing: false,
@@ -115,6 +119,8 @@ pub struct State {
     pub strain: Voigt,
     /// Its mechanical part, in units of the modulus at 28 days.
     pub mechanical: Voigt,
+    /// By how much it has swollen while it was crushed ([`Cracks::Planes`]).
+    pub swollen: Voigt,
     /// Its creep.
     pub creep: Voigt,
     /// Kelvin units.
@@ -293,6 +299,7 @@ impl Concrete {
         State {
             strain: ZERO,
             mechanical: ZERO,
+            swollen: ZERO,
             creep: ZERO,
             history: History::default(),
             drive: ZERO,
@@ -448,6 +455,7 @@ impl Concrete {
         let state = State {
             strain: *strain,
             mechanical: split.mechanical(),
+            swollen: ZERO,
             creep: found.creep,
             history: clock.increment.advance(&state.history, &tensor::sub(&drive, &state.drive)),
             drive,

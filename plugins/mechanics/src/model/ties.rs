@@ -1,21 +1,30 @@
 //! How bars keep cracks apart: a crack's tension goes into the bars across it and comes back into
 //! the concrete by bond, so that the next crack cannot be near.
 //!
-//! A bar does this to the concrete within 7.5 diameters of its axis (CEB-FIP 1978), however the
-//! mesh divides it. Its steel is spread evenly over that zone, as far as it is concrete that hangs
-//! together with the brick that the bar lies in.
+//! A bar does this to the concrete about it up to 1.5 times as far as its axis is from the surface,
+//! so that it is 2.5 times that in all (MC2010, 7.6.4.4, as EN 1992-1-1, 7.3.2), but within 7.5 of
+//! its diameters (CEB-FIP 1978), however the mesh divides it. Its steel is spread evenly over that
+//! zone, as far as it is concrete that hangs together with the brick that the bar lies in.
 
 use std::collections::BTreeSet;
 
 use glam::DVec3;
 
 use super::{Matter, Model, Steel, SteelKind};
-use crate::{element::hex8, element::rod::Piece, material::law::Ties};
+use crate::{
+    element::{hex8, rod::Piece},
+    material::law::Ties,
+    mesh::{Mesh, voxel::distance::Triangles},
+};
 
-/// How far from its axis a bar keeps cracks apart, in diameters (CEB-FIP 1978).
+/// How far from its axis a bar keeps cracks apart, over its distance from the surface.
+const DEEP: f64 = 1.5;
+/// The most of that, in diameters.
 const REACH: f64 = 7.5;
-/// Pieces of a bar are looked at together up to this share of that distance.
-const STRETCH: f64 = 0.5;
+/// Cosine from which on a face's normal runs along a bar: it is where the bar ends.
+const ALONG: f64 = 0.7;
+/// Pieces of a bar are looked at together up to so many diameters.
+const STRETCH: f64 = 3.0;
 
 /// What the bars about every brick do to its cracks. `ρ` being their share of the concrete, bonded
 /// by 1.8 f_ct: l of a bar hands on a crack's tension where 4 · 1.8 ρ l/φ = 1; cracks lie 2 l apart
@@ -33,9 +42,10 @@ pub(super) fn ties(model: &Model) -> Vec<Ties> {
         return ties;
     }
     let neighbours = model.mesh.neighbours();
+    let surface = surface(&model.mesh);
     for (steel, yielding) in bars() {
-        let reach = REACH * steel.diameter;
-        for stretch in stretches(steel, STRETCH * reach) {
+        for stretch in stretches(steel, STRETCH * steel.diameter) {
+            let reach = (REACH * steel.diameter).min(DEEP * beside(&surface, stretch));
             let zone = Zone::about(model, &neighbours, stretch, reach);
             for (axis, along, square) in (0..3).map(|axis| lengths(stretch, axis)) {
                 for &(hex, share) in &zone.0 {
@@ -50,7 +60,29 @@ pub(super) fn ties(model: &Model) -> Vec<Ties> {
     ties
 }
 
-/// Pieces in a row, at most some `length` m long.
+/// All that has nothing behind it.
+fn surface(mesh: &Mesh) -> Triangles {
+    let halves = |face| {
+        let [a, b, c, d] = mesh.face(face).map(|n| mesh.nodes[n as usize]);
+        [[a, b, c], [a, c, d]]
+    };
+    Triangles::new(mesh.outer_faces().into_iter().flat_map(halves).collect())
+}
+
+/// How far the surface beside a stretch of a bar is from it, m.
+fn beside(surface: &Triangles, stretch: &[Piece]) -> f64 {
+    let [from, to] = ends(stretch);
+    let along = (to - from).normalize_or_zero();
+    surface.distance_where(0.5 * (from + to), |[a, b, c]| {
+        (b - a).cross(c - a).normalize_or_zero().dot(along).abs() < ALONG
+    })
+}
+
+fn ends(stretch: &[Piece]) -> [DVec3; 2] {
+    [stretch[0].ends[0], stretch[stretch.len() - 1].ends[1]]
+}
+
+/// Pieces in a row, at least one, at most some `length` m long.
 fn stretches(steel: &Steel, length: f64) -> Vec<&[Piece]> {
     let mut rest = &steel.pieces[..];
     let mut found = Vec::new();
@@ -92,7 +124,7 @@ impl Zone {
         let mut queue: Vec<u32> = hosts.collect();
         let mut seen: BTreeSet<u32> = queue.iter().copied().collect();
         let (mut near, mut whole) = (Vec::new(), 0.0);
-        let axis = [stretch[0].ends[0], stretch[stretch.len() - 1].ends[1]];
+        let axis = ends(stretch);
         while let Some(hex) = queue.pop() {
             let corners = model.mesh.corners(hex);
             let within = |natural: &&DVec3| apart(place(&corners, **natural), axis) <= reach;

@@ -51,6 +51,11 @@ impl Triangles {
 
     /// Distance to the nearest triangle, m; infinite without triangles.
     pub(crate) fn distance(&self, point: DVec3) -> f64 {
+        self.distance_where(point, |_| true)
+    }
+
+    /// Distance to the nearest of the triangles that are admitted, m; infinite without any.
+    pub(crate) fn distance_where(&self, point: DVec3, admit: impl Fn(&[DVec3; 3]) -> bool) -> f64 {
         let mut best = f64::INFINITY;
         let mut stack = vec![0usize];
         while let Some(n) = stack.pop() {
@@ -62,6 +67,7 @@ impl Triangles {
                 let leaf = &self.triangles[node.from as usize..(node.from + node.count) as usize];
                 best = leaf
                     .iter()
+                    .filter(|t| admit(t))
                     .map(|t| nearest(t, point).distance_squared(point))
                     .fold(best, f64::min);
                 continue;
