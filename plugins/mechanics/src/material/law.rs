@@ -622,12 +622,16 @@ fn crushing_limit(stress: &Voigt) -> f64 {
     tensor::von_mises(stress) / (1.0 - ALPHA)
 }
 
+/// By how many times the pressure across it [`crushing_stress`] raises the strength: (1 + 2α + γ)/(1
+/// − α).
+pub(super) const CONFINED: f64 = (1.0 + 2.0 * ALPHA + GAMMA) / (1.0 - ALPHA);
+/// 3(1 − K_c)/(2K_c − 1) with K_c = .7.
+const GAMMA: f64 = 0.9 / 0.4;
+
 /// Lubliner's criterion (1989) of the compressive parts of principal stresses, largest first: the
 /// uniaxial compression that is as dangerous, Pa.
 #[must_use]
 pub(crate) fn crushing_stress(principal: [f64; 3]) -> f64 {
-    /// 3(1 − K_c)/(2K_c − 1) with K_c = .7.
-    const GAMMA: f64 = 0.9 / 0.4;
     let [a, b, c] = principal.map(|s| (-s).max(0.0));
     let mises = (0.5 * ((a - b).powi(2) + (b - c).powi(2) + (c - a).powi(2))).sqrt();
     let least = a.min(b).min(c);
