@@ -135,9 +135,9 @@ pub(crate) enum Command {
     )]
     Measure(Measure),
     /// Computes stress, creep and damage of members over their load history, or runs an Abaqus or
-    /// CalculiX deck
+    /// CalculiX deck or a Gmsh mesh
     #[command(
-        after_help = "Examples:\n  intrados analyze column --out stress\n  intrados analyze tunnel --member T1 --element 0.3 --format json\n  intrados analyze beam --member B1 --fine 0.4..0.6 --out stress\n  intrados analyze bracket.inp --units mm,N --out stress\n\nWhat it does not do: bars and tendons of glTF members are used only where their nodes say how they run, as those of `intrados import` do (else it is plain concrete, with a warning); displacements are taken as small (near or beyond the load of buckling it warns or ends); a Gmsh mesh brings no materials or loads and is refused; bricks that grow in layers are in the library and no scene asks for them."
+        after_help = "Examples:\n  intrados analyze column --out stress\n  intrados analyze tunnel --member T1 --element 0.3 --format json\n  intrados analyze beam --member B1 --fine 0.4..0.6 --out stress\n  intrados analyze bracket.inp --units mm,N --out stress\n  intrados analyze wall.msh --units m,N --groups wall.groups.ron --out stress\n\nWhat the physical groups of a mesh are is said in a file such as\n  (schema: \"intrados.groups/1\",\n   materials: [(group: \"core\", modulus_gpa: 33, poisson: 0.2, density_kg_m3: 2500, expansion_1e6_k: 10)],\n   supports: [(group: \"foot\", x: true, y: true, z: true), (group: \"side\", x: true, moved_mm: (0.5, 0, 0))],\n   loads: [(action: Weight(gravity_m_s2: (0, 0, -9.81))),\n           (group: \"top\", action: Pressure(pressure_kpa: 100)),\n           (group: \"top\", action: Traction(traction_kpa: (20, 0, 0))),\n           (group: \"rim\", action: Force(force_kn: (0, 0, -10))),\n           (group: \"core\", action: Temperature(uniform_k: 15))])\nMaterials, weight and temperature without a group are those of all solids.\n\nWhat it does not do: bars and tendons of glTF members are used only where their nodes say how they run, as those of `intrados import` do (else it is plain concrete, with a warning); displacements are taken as small (near or beyond the load of buckling it warns or ends); a Gmsh mesh is of solids, linear elastic, in one step; bricks that grow in layers are in the library and no scene asks for them."
     )]
     Analyze(Analyze),
     /// Scans members with X-rays: projections, reconstructed slices, and the truth beside them; or
@@ -802,11 +802,16 @@ pub(crate) struct Keep {
 
 #[derive(Debug, Args)]
 pub(crate) struct Analyze {
-    /// What to compute: a scene, or a deck (.inp)
+    /// What to compute: a scene, a deck (.inp), or a Gmsh mesh (.msh)
     pub(crate) scene: PathBuf,
-    /// Units of a deck, which says none itself: m,N (SI) or mm,N (MPa, t/mm³)
+    /// Units of a deck, which says none itself: m,N (SI) or mm,N (MPa, t/mm³); of a mesh that of its
+    /// lengths
     #[arg(long, value_name = "LENGTH,FORCE", value_parser = |text: &str| text.parse::<Units>())]
     pub(crate) units: Option<Units>,
+    /// What the physical groups of a mesh are made of, what holds them and what acts on them (RON);
+    /// NAME.groups.ron beside it if absent
+    #[arg(long, value_name = "FILE")]
+    pub(crate) groups: Option<PathBuf>,
     /// Only these members
     #[arg(long, value_name = "ID")]
     pub(crate) member: Vec<String>,

@@ -82,6 +82,7 @@ fn exit_codes_say_what_went_wrong() {
     let other = file("notes.txt", "hello");
     let empty = file("empty.tif", "");
     let mesh = file("mesh.msh", "$MeshFormat\n4.1 0 8\n");
+    let groups = file("said.ron", GROUPS);
     let deck = file("deck.inp", "*NODE\n1,0,0\n*ELEMENT, TYPE=C3D8\n1,1,2,3,4,5,6,7,8\n");
     let below_a_file = format!("{}/sub", text(&other));
     let cases: &[(i32, &[&str])] = &[
@@ -102,7 +103,11 @@ fn exit_codes_say_what_went_wrong() {
         (2, &["analyze", "column", "--units", "m,N"]),
         (65, &["analyze", "tunnel", "--member", "T1", "--element", "0.55"]),
         (65, &["analyze", text(&deck), "--units", "m,N"]),
-        (65, &["analyze", text(&mesh), "--units", "m,N"]),
+        (2, &["analyze", "column", "--groups", text(&other)]),
+        (2, &["analyze", text(&deck), "--units", "m,N", "--groups", text(&other)]),
+        (65, &["analyze", text(&mesh), "--units", "m,N", "--groups", text(&other)]),
+        (65, &["analyze", text(&mesh), "--units", "m,N", "--groups", text(&groups)]),
+        (66, &["analyze", text(&mesh), "--units", "m,N"]),
         (66, &["analyze", "/does/not/exist.inp", "--units", "m,N"]),
         (2, &["frobnicate"]),
         (2, &["view"]),
@@ -226,6 +231,33 @@ fn a_deck_is_analyzed() {
             && output.stdout.is_empty(),
         "{stderr}"
     );
+}
+
+/// What a mesh of a cube is: 10 MPa on its head.
+const GROUPS: &str = "(schema: \"intrados.groups/1\", materials: [(modulus_gpa: 30, poisson: 0)], \
+    supports: [(group: \"foot\", x: true, y: true, z: true)], \
+    loads: [(group: \"head\", action: Pressure(pressure_kpa: 10000))])";
+
+/// The cube of the deck as a mesh of Gmsh, and what its groups are beside it.
+#[test]
+fn a_mesh_is_analyzed_by_what_its_groups_are() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mesh, out) = (folder.path().join("cube.msh"), folder.path().join("out"));
+    let text_of = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n2\n2 1 \"foot\"\n2 2 \"head\"\n$EndPhysicalNames\n\
+        $Nodes\n8\n1 0 0 0\n2 100 0 0\n3 100 100 0\n4 0 100 0\n5 0 0 100\n6 100 0 100\n7 100 100 100\n8 0 100 100\n$EndNodes\n\
+        $Elements\n3\n1 3 2 1 1 1 2 3 4\n2 3 2 2 2 5 6 7 8\n3 5 2 3 1 1 2 3 4 5 6 7 8\n$EndElements\n";
+    fs::write(&mesh, text_of).unwrap();
+    fs::write(folder.path().join("cube.groups.ron"), GROUPS).unwrap();
+    let found = json(&["analyze", text(&mesh), "--units", "mm,N", "--out", text(&out)]);
+    assert_eq!(found["schema"], "intrados.deck/1");
+    assert_eq!(found["deck"], "cube");
+    let step = &found["steps"][0];
+    let off = |value: &serde_json::Value, exact: f64| value.as_f64().unwrap() / exact - 1.0;
+    assert!(off(&step["max_displacement_m"], 0.1 * 10.0 / 30000.0).abs() < 1e-6, "{found}");
+    assert!(off(&step["max_von_mises_pa"], 10e6).abs() < 1e-6, "{found}");
+    for name in ["displacements.csv", "stresses.csv", "step_0001.vtu", "analyze.json"] {
+        assert!(out.join(name).is_file(), "{name}");
+    }
 }
 
 #[test]

@@ -10,12 +10,12 @@ use intrados_mechanics::{
     analysis::{GaugeOutcome, MemberOutcome, Moment, Outcome as Life, Pictures, analyze},
     deck::Case,
     frame::Whole,
-    linear::concerns,
+    linear::{Groups, concerns, parse, parse_mesh},
     material::law::Cracks,
     member::{Along, Axes, MemberError, Meshing, Prepared, prepare_within},
     mesh::voxel::VoxelError,
     model::{self, MarchSettings, Regularisation},
-    read::{self, ReadError},
+    read::{self, ReadError, Units},
     skin::{Looking, Seen},
     strength::{CurvePoint, Strength},
     stretch::Stretch,
@@ -288,6 +288,9 @@ fn scene(session: &Session, args: &args::Analyze) -> Result<Work, Failure> {
     if args.units.is_some() {
         return Err(Failure::Usage("--units is for decks (.inp): a scene says its units".into()));
     }
+    if args.groups.is_some() {
+        return Err(Failure::Usage("--groups is for Gmsh meshes (.msh)".into()));
+    }
     let scene = walks::load(session, &args.scene)?;
     let structure = &scene.structure;
     let known: BTreeSet<&str> = structure.assemblies.iter().map(|a| a.id.as_str()).collect();
@@ -395,12 +398,12 @@ enum Read {
     Linear(Box<linear::Read>),
 }
 
-/// A deck of another program.
+/// A deck or a mesh of another program.
 fn deck(args: &args::Analyze, kind: &str) -> Result<Read, Failure> {
     let path = &args.scene;
     let Some(units) = args.units else {
         return Err(Failure::Usage(format!(
-            "{}: a deck says no units: give --units m,N or --units mm,N",
+            "{}: a deck or mesh says no units: give --units m,N or --units mm,N",
             path.display()
         )));
     };
@@ -413,28 +416,21 @@ fn deck(args: &args::Analyze, kind: &str) -> Result<Read, Failure> {
             )));
         }
     }
+    if kind == "inp" && args.groups.is_some() {
+        return Err(Failure::Usage("--groups is for Gmsh meshes (.msh)".into()));
+    }
     let bytes = read::bytes(path)?;
     let hash = blake3::hash(&bytes).to_hex().to_string();
     let name =
         path.file_stem().map_or_else(|| "deck".into(), |stem| stem.to_string_lossy().into_owned());
-    let deck = if kind == "inp" {
-        if concerns(&bytes) {
-            let deck = intrados_mechanics::linear::parse(&bytes, path, units)?;
-            return Ok(Read::Linear(Box::new(linear::Read { deck, name, hash })));
-        }
-        read::abaqus::parse(&bytes, path, units)?
-    } else {
-        read::gmsh::parse(&bytes, path, units)?
-    };
     if kind == "msh" {
-        return Err(Failure::BadInput(format!(
-            "{}: a Gmsh mesh ({} nodes, {} bricks) brings no materials, supports or loads: save it as .inp and add \
-             *MATERIAL, *SOLID SECTION, *BOUNDARY and *STEP",
-            path.display(),
-            deck.mesh.nodes.len(),
-            deck.mesh.hexes.len()
-        )));
+        return mesh(args, units, &bytes, name);
     }
+    if concerns(&bytes) {
+        let deck = parse(&bytes, path, units)?;
+        return Ok(Read::Linear(Box::new(linear::Read { deck, name, hash })));
+    }
+    let deck = read::abaqus::parse(&bytes, path, units)?;
     let case =
         Case::new(deck).map_err(|why| Failure::BadInput(format!("{}: {why}", path.display())))?;
     let prepared = vec![case.prepared(&name)];
@@ -448,6 +444,25 @@ fn deck(args: &args::Analyze, kind: &str) -> Result<Read, Failure> {
         is_scene: false,
         loads: Vec::new(),
     }))
+}
+
+/// A mesh of Gmsh, and what its groups are.
+fn mesh(args: &args::Analyze, units: Units, bytes: &[u8], name: String) -> Result<Read, Failure> {
+    let path = &args.scene;
+    let beside = path.with_extension("groups.ron");
+    if args.groups.is_none() && !beside.exists() {
+        return Err(Failure::NoInput(format!(
+            "{}: a mesh brings no materials, supports or loads: say in {} what its physical groups are, or give --groups FILE",
+            path.display(),
+            beside.display()
+        )));
+    }
+    let said = args.groups.as_ref().unwrap_or(&beside);
+    let text = read::bytes(said)?;
+    let groups = Groups::parse(&text, said)?;
+    let deck = parse_mesh(bytes, path, units, &groups)?;
+    let hash = blake3::Hasher::new().update(bytes).update(&text).finalize();
+    Ok(Read::Linear(Box::new(linear::Read { deck, name, hash: hash.to_hex().to_string() })))
 }
 
 /// A life with its files, and what is seen of it from outside.
@@ -479,7 +494,7 @@ fn drawn_life(
 }
 
 /// A file of a set, named where it would have come to lie.
-fn not_written(folder: &Path, error: WriteError) -> Failure {
+pub(super) fn not_written(folder: &Path, error: WriteError) -> Failure {
     Failure::cannot_write(&folder.join(error.path.file_name().unwrap_or_default()), error.source)
 }
 

@@ -5,10 +5,12 @@ use std::fmt::Write as _;
 use intrados_mechanics::{
     linear::{Deck, LinearError, Solved},
     tensor::von_mises,
+    write::Field,
 };
-use intrados_stage::cpu_seconds;
+use intrados_stage::{cpu_seconds, file::Set};
 use serde::Serialize;
 
+use super::analyze::not_written;
 use crate::{
     args,
     failure::{Failure, Outcome},
@@ -67,7 +69,7 @@ pub(crate) fn run(
     ];
     if let Some((_, option)) = of_members.into_iter().find(|(given, _)| *given) {
         return Err(Failure::Usage(format!(
-            "{option}: this deck is linear elastic, and solved directly"
+            "{option}: this deck or mesh is linear elastic, and solved directly"
         )));
     }
     let begin = cpu_seconds();
@@ -99,6 +101,7 @@ pub(crate) fn run(
         if solved.iter().any(|s| !s.eigenvalues.is_empty()) {
             files.write("eigenvalues.csv", eigenvalues(&solved).as_bytes())?;
         }
+        pictures(&mut files, &read.deck, &solved)?;
         report.files = files.listed(LIST);
         files.finish(LIST, &report)?;
     }
@@ -116,6 +119,31 @@ fn step(solved: &Solved) -> Step {
         max_temperature: solved.temperatures.iter().copied().reduce(f64::max),
         eigenvalues: solved.eigenvalues.clone(),
     }
+}
+
+/// A VTU a step that ends in displacements or temperatures; stresses are the means of each element.
+fn pictures(files: &mut Set, deck: &Deck, solved: &[Solved]) -> Result<(), Failure> {
+    let Some(grid) = deck.grid() else { return Ok(()) };
+    for (k, step) in solved.iter().enumerate() {
+        let moved: Vec<f64> = step.displacements.iter().flat_map(|u| u.to_array()).collect();
+        let mean = |points: &Vec<[f64; 6]>| -> [f64; 6] {
+            let count = points.len().max(1) as f64;
+            std::array::from_fn(|c| points.iter().map(|s| s[c]).sum::<f64>() / count)
+        };
+        let stress: Vec<f64> = step.stresses.iter().flat_map(mean).collect();
+        let point = [("displacement_m", 3, &moved), ("temperature", 1, &step.temperatures)];
+        let points = point.map(|(name, components, values)| Field { name, components, values });
+        let points: Vec<Field<'_>> = points.into_iter().filter(|f| !f.values.is_empty()).collect();
+        let cell = Field { name: "stress_pa", components: 6, values: &stress };
+        let cells: Vec<Field<'_>> = [cell].into_iter().filter(|f| !f.values.is_empty()).collect();
+        if points.is_empty() {
+            continue;
+        }
+        let place = files.place(format!("step_{:04}.vtu", k + 1));
+        let folder = files.folder().to_owned();
+        grid.write(&place, &points, &cells).map_err(|e| not_written(&folder, e))?;
+    }
+    Ok(())
 }
 
 /// One row a node and step. Writing to a string cannot fail.

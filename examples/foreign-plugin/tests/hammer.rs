@@ -15,7 +15,7 @@ const SCENE: &str = r#"(
 fn predict(folder: &Path, table: &str) -> (serde_json::Value, String) {
     std::fs::write(folder.join("two.ron"), SCENE).expect("a scene");
     std::fs::write(folder.join("rebound.csv"), table).expect("a table");
-    let run = Command::new(env!("CARGO_BIN_EXE_work-light"))
+    let run = Command::new(env!(concat!("CARGO_BIN_EXE_", env!("CARGO_PKG_NAME"))))
         .args(["predict", "two.ron", "--spp", "0", "--out", "out", "--format", "json", "--quiet"])
         .current_dir(folder)
         .output()

@@ -22,7 +22,7 @@ mod summary;
 pub mod tracer;
 
 pub use crack::{CrackSurface, Mouth, Spalled, SurfaceDamage, SurfaceFile};
-pub use file::reference;
+pub use file::{parse_ron, reference};
 pub use finish::{Finish, FinishKind, StainKind};
 pub use lamp::{Lamp, LampKind};
 pub use lens::Lens;

@@ -118,11 +118,11 @@ macro_rules! attacks {
 }
 
 attacks!(scene, model, properties, mesh, picture, slices, volume, evidence, table, profile, cracks);
-attacks!(deck, gmsh);
+attacks!(deck, gmsh, groups);
 
 #[test]
 fn every_reader_is_attacked() {
-    assert_eq!(READERS.len(), 13);
+    assert_eq!(READERS.len(), 14);
     for reader in &READERS {
         assert!(!(reader.corpus)().is_empty(), "{}", reader.name);
     }

@@ -12,8 +12,9 @@ use intrados_damage::grading::Profile;
 use intrados_light::{LitScene, Render, RenderSettings, Sensor, learn, scene_rule};
 use intrados_mechanics::{
     deck::Case,
+    linear::{Groups, parse_mesh},
     member::{Meshing, prepare},
-    read::{Units, abaqus, gmsh},
+    read::{Units, abaqus},
 };
 use intrados_scene::{
     Camera, CrackSurface, Lamp, LampKind, Material, Member, MemberKind, Mesh, Mouth, Object, Part,
@@ -38,7 +39,7 @@ pub(crate) struct Reader {
     pub(crate) cases: u64,
 }
 
-pub(crate) const READERS: [Reader; 13] = [
+pub(crate) const READERS: [Reader; 14] = [
     Reader { name: "scene", extension: "ron", reads: scene, corpus: scenes, cases: 300 },
     Reader { name: "model", extension: "glb", reads: model, corpus: models, cases: 300 },
     Reader {
@@ -69,6 +70,13 @@ pub(crate) const READERS: [Reader; 13] = [
         reads: mesh_of_gmsh,
         corpus: meshes_of_gmsh,
         cases: 400,
+    },
+    Reader {
+        name: "groups",
+        extension: "groups.ron",
+        reads: groups,
+        corpus: lists_of_groups,
+        cases: 300,
     },
 ];
 
@@ -212,8 +220,18 @@ fn deck(path: &Path) {
 }
 
 fn mesh_of_gmsh(path: &Path) {
-    if let Ok(deck) = gmsh::read(path, Units::MetreNewton) {
-        let _ = Case::new(deck);
+    let said = lists_of_groups().swap_remove(0);
+    let groups = Groups::parse(&said, Path::new("said.ron")).unwrap();
+    let _ = parse_mesh(&fs::read(path).unwrap(), path, Units::MetreNewton, &groups);
+}
+
+fn groups(path: &Path) {
+    if let Ok(groups) = Groups::parse(&fs::read(path).unwrap(), path) {
+        for mesh in meshes_of_gmsh() {
+            if let Ok(deck) = parse_mesh(&mesh, path, Units::MetreNewton, &groups) {
+                let _ = deck.solve(&Job::default());
+            }
+        }
     }
 }
 
@@ -560,6 +578,23 @@ fn decks() -> Vec<Vec<u8>> {
     let step = "*STEP\n*STATIC\n0.1,1.0\n*CLOAD\n7,3,-0.25\n*DLOAD\n1,P6,1.0\nEALL,GRAV,9810.,0,0,-1\n*END STEP\n";
     let more = "*NSET, NSET=TOP, GENERATE\n5,8,1\n*AMPLITUDE, NAME=A\n0,0,1,1\n*STEP, INC=100\n*STATIC\n*BOUNDARY, AMPLITUDE=A\nTOP,3,3,0.001\n*TEMPERATURE\nNALL,20\n*END STEP\n";
     vec![format!("{cube}{step}").into_bytes(), format!("{cube}{more}{step}").into_bytes()]
+}
+
+/// What the groups of [`meshes_of_gmsh`] are.
+fn lists_of_groups() -> Vec<Vec<u8>> {
+    let said = r#"(
+    schema: "intrados.groups/1",
+    materials: [(group: "core", modulus_gpa: 33, poisson: 0.2, density_kg_m3: 2500, expansion_1e6_k: 10)],
+    supports: [(group: "left", x: true, y: true, z: true, moved_mm: (0, 0, 0.5))],
+    loads: [
+        (action: Weight(gravity_m_s2: (0, 0, -9.81))),
+        (group: "left", action: Pressure(pressure_kpa: 100)),
+        (group: "left", action: Traction(traction_kpa: (20, 0, 0))),
+        (group: "left", action: Force(force_kn: (0, 0, -10))),
+        (group: "core", action: Temperature(uniform_k: 15)),
+    ],
+)"#;
+    vec![said.into()]
 }
 
 fn meshes_of_gmsh() -> Vec<Vec<u8>> {

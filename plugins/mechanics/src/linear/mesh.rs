@@ -19,7 +19,7 @@ use crate::read::{
 };
 
 /// Nodes or elements of a deck: more are a mistake.
-const MAX_COUNT: usize = 5_000_000;
+pub(super) const MAX_COUNT: usize = 5_000_000;
 
 /// What an element type is; `None`: not computed.
 pub(super) fn kind(name: &str) -> Option<Kind> {

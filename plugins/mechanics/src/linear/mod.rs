@@ -14,10 +14,15 @@
 //! | steps | `*STATIC`, `*FREQUENCY`, `*BUCKLE`, `*HEAT TRANSFER` (steady, in time, FREQUENCY) without `NLGEOM`; `OP=MOD` and `OP=NEW` |
 //!
 //! Everything else is refused in one line that names all of it.
+//!
+//! Meshes of Gmsh become the same decks ([`parse_mesh`]) by a file that says what their physical
+//! groups are made of, what holds them and what acts on them ([`Groups`]).
 
 mod constraint;
 mod element;
 mod flat;
+mod gmsh;
+mod groups;
 mod heat;
 mod law;
 mod link;
@@ -33,6 +38,8 @@ mod thin;
 mod tie;
 mod warm;
 
+pub use gmsh::parse_mesh;
+pub use groups::Groups;
 pub use model::Deck;
 pub use read::{concerns, parse};
 pub use solve::{LinearError, Solved};

@@ -9,7 +9,10 @@ use super::{
     law::{Elastic, Expansion, Table},
     shape::{Point, Shape},
 };
-use crate::tensor::{self, Frame, Voigt};
+use crate::{
+    tensor::{self, Frame, Voigt},
+    write::Grid,
+};
 
 /// A linear elastic model and its steps.
 #[derive(Debug, Clone, Default)]
@@ -215,6 +218,14 @@ impl Deck {
     /// Numbers of its elements.
     pub fn elements(&self) -> impl ExactSizeIterator<Item = u32> {
         self.cells.iter().map(|c| c.label)
+    }
+
+    /// Its elements as a picture, whose regions are their materials; none where planes, beams or
+    /// shells have become solids with nodes that the deck does not name.
+    #[must_use]
+    pub fn grid(&self) -> Option<Grid<'_>> {
+        let cells = self.cells.iter().map(|c| (c.shape.vtk(), c.nodes.as_slice(), c.material));
+        (self.nodes.len() == self.labels.len()).then(|| Grid::of(&self.nodes, cells))
     }
 
     /// Gives nodes that thicken flat elements the temperature of their own.

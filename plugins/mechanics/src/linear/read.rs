@@ -33,8 +33,6 @@ const KNOWN: &str = "NODE ELEMENT NSET ELSET SURFACE MATERIAL ELASTIC DENSITY EX
 const OUTPUT: [&str; 2] = ["FACEPRINT", "TIMEPOINTS"];
 /// Cards that only say how contact would behave: without contact they say nothing.
 const CONTACT: [&str; 3] = ["SURFACEINTERACTION", "SURFACEBEHAVIOR", "FRICTION"];
-/// Faults that one line names.
-const NAMED: usize = 12;
 
 /// Whether a deck has something in it that the reader of decks for members does not know, and so
 /// this one is asked.
@@ -234,20 +232,7 @@ impl Reader {
 
     /// All faults so far as one.
     fn fail(&mut self) -> Result<(), Fault> {
-        let mut faults = std::mem::take(&mut self.faults);
-        if faults.is_empty() {
-            return Ok(());
-        }
-        let first = faults.remove(0);
-        let mut reason = first.reason;
-        for fault in faults.iter().take(NAMED - 1) {
-            let line = fault.line.map_or(String::new(), |l| format!("line {l}: "));
-            reason += &format!("; {line}{}", fault.reason);
-        }
-        if faults.len() >= NAMED {
-            reason += &format!("; and {} more", faults.len() + 1 - NAMED);
-        }
-        Err(Fault { line: first.line, reason })
+        Fault::all(std::mem::take(&mut self.faults))
     }
 
     /// Names all that is not computed, each once.

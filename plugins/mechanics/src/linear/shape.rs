@@ -168,6 +168,18 @@ impl Shape {
         }
     }
 
+    /// VTK's number for cells of its nodes, which has them in the same order.
+    pub(super) fn vtk(self) -> u8 {
+        match self {
+            Self::Hex8 | Self::Hex8Bubbles => 12,
+            Self::Hex20 | Self::Hex20Reduced => 25,
+            Self::Tet4 => 10,
+            Self::Tet10 => 24,
+            Self::Wedge6 => 13,
+            Self::Wedge15 => 26,
+        }
+    }
+
     /// Its functions there, one a node.
     pub(super) fn functions(self, at: [f64; 3]) -> Vec<Jet> {
         let x = coordinates(at);

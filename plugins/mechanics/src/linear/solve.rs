@@ -70,7 +70,9 @@ pub enum LinearError {
         material: String,
     },
     /// Parts that nothing holds.
-    #[error("{step}: a part of the model can move freely: hold it by *BOUNDARY, *EQUATION or *TIE")]
+    #[error(
+        "{step}: a part of the model can move freely: hold it by supports (of a deck *BOUNDARY, *EQUATION or *TIE)"
+    )]
     Floating {
         /// Name of the step.
         step: String,

@@ -1,5 +1,5 @@
-//! Meshes and models of other programs: Abaqus and CalculiX decks ([`abaqus`]), Gmsh meshes
-//! ([`gmsh`]).
+//! Meshes and models of other programs: Abaqus and CalculiX decks ([`abaqus`]), Gmsh meshes (by
+//! [`crate::linear::parse_mesh`]).
 //!
 //! Files carry no units, so the reader is told [`Units`] and gives SI. What a file says is checked
 //! before it is used, and what is not understood is refused with one line naming file, line and
@@ -8,7 +8,7 @@
 
 pub mod abaqus;
 mod deck;
-pub mod gmsh;
+pub(crate) mod gmsh;
 
 use std::{
     path::{Path, PathBuf},
@@ -24,6 +24,8 @@ pub(crate) use deck::{
 
 /// The largest file that is read, bytes.
 pub(crate) const MAX_BYTES: u64 = 2 << 30;
+/// Faults that one line names.
+const NAMED: usize = 12;
 /// Entries that sets, loads and supports of one file may expand to.
 const MAX_ENTRIES: usize = 50_000_000;
 
@@ -142,6 +144,21 @@ impl Fault {
 
     pub(crate) fn whole(reason: impl Into<String>) -> Self {
         Self { line: None, reason: reason.into() }
+    }
+
+    /// All faults as one, at the line of the first; none: nothing is wrong.
+    pub(crate) fn all(faults: Vec<Self>) -> Result<(), Self> {
+        let count = faults.len();
+        let mut faults = faults.into_iter();
+        let Some(mut all) = faults.next() else { return Ok(()) };
+        for fault in faults.take(NAMED - 1) {
+            let line = fault.line.map_or(String::new(), |l| format!("line {l}: "));
+            all.reason += &format!("; {line}{}", fault.reason);
+        }
+        if count > NAMED {
+            all.reason += &format!("; and {} more", count - NAMED);
+        }
+        Err(all)
     }
 
     pub(crate) fn of(self, path: &Path) -> ReadError {

@@ -73,6 +73,17 @@ impl<'a> Grid<'a> {
         grid
     }
 
+    /// Cells of any kind between points: VTK's number, nodes and region of each.
+    #[must_use]
+    pub(crate) fn of<'b>(
+        points: &'a [DVec3],
+        cells: impl Iterator<Item = (u8, &'b [u32], u32)>,
+    ) -> Self {
+        let mut grid = Self { points: points.into(), ..Self::default() };
+        cells.for_each(|(kind, nodes, region)| grid.push(kind, nodes, region));
+        grid
+    }
+
     fn push(&mut self, kind: u8, nodes: &[u32], region: u32) {
         self.connectivity.extend(nodes.iter().map(|&n| n as i32));
         self.offsets.push(self.connectivity.len() as i64);

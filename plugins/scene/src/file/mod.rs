@@ -46,6 +46,9 @@ pub(crate) use slices::{extension, is_image, listing, matches};
 /// The schema that this version reads.
 pub const SCHEMA: &str = "intrados.scene/1";
 
+/// Where all fields of scenes and evidence are listed.
+const PAGE: &str = "`intrados schema --page`";
+
 /// Longest scene text that is read, bytes. Geometry beyond that belongs into a glTF file.
 pub const MAX_BYTES: usize = 64 << 20;
 
@@ -142,13 +145,30 @@ pub fn parse(name: &str, text: &str) -> Result<SceneFile, Problem> {
         let message = "is evidence and no scene: open the scene that it belongs to, which reads it";
         return Err(Problem::error(name, "SCHEMA", message));
     }
-    let scene: SceneFile = read(name, text)?;
+    let scene: SceneFile = read(name, text, PAGE)?;
     known_schema(name, text, &scene.schema, SCHEMA)?;
     Ok(scene)
 }
 
-/// Reads RON of any schema.
-fn read<T: DeserializeOwned>(name: &str, text: &str) -> Result<T, Problem> {
+/// Reads RON of a schema of somebody else's, as scenes are read: `schema` is the one that is known,
+/// `found` the one that is written, and `page` says where its fields are listed.
+///
+/// # Errors
+/// A problem whose place is `name:line:column`.
+pub fn parse_ron<T: DeserializeOwned>(
+    name: &str,
+    text: &str,
+    schema: &str,
+    found: impl FnOnce(&T) -> &str,
+    page: &str,
+) -> Result<T, Problem> {
+    let value = read(name, text, page)?;
+    known_schema(name, text, found(&value), schema)?;
+    Ok(value)
+}
+
+/// Reads RON of any schema, whose fields are listed on a page.
+fn read<T: DeserializeOwned>(name: &str, text: &str, page: &str) -> Result<T, Problem> {
     if text.len() > MAX_BYTES {
         let message = format!(
             "the text has {} MiB, more than {}: move geometry into a glTF file",
@@ -162,7 +182,7 @@ fn read<T: DeserializeOwned>(name: &str, text: &str) -> Result<T, Problem> {
     let options = ron::Options::default()
         .with_default_extension(Extensions::IMPLICIT_SOME)
         .with_recursion_limit(MAX_DEPTH);
-    options.from_str(text).map_err(|e| syntax_problem(name, text, &e))
+    options.from_str(text).map_err(|e| syntax_problem(name, text, &e, page))
 }
 
 /// Refuses a schema of another version.
@@ -191,7 +211,7 @@ pub(crate) fn shorten(text: &str) -> String {
 }
 
 /// One line that says what, where and what to do.
-fn syntax_problem(name: &str, text: &str, error: &SpannedError) -> Problem {
+fn syntax_problem(name: &str, text: &str, error: &SpannedError, page: &str) -> Problem {
     use ron::Error as E;
     let (line, column) = (error.span.start.line, error.span.start.col);
     let decimal = decimal_comma(text, line, column);
@@ -202,7 +222,7 @@ fn syntax_problem(name: &str, text: &str, error: &SpannedError) -> Problem {
         E::NoSuchStructField { expected, found, .. }
         | E::NoSuchEnumVariant { expected, found, .. } => match nearest(found, expected) {
             Some(word) => format!("did you mean `{word}`?"),
-            None => "take it out; `intrados schema --page` lists every field".into(),
+            None => format!("take it out; {page} lists every field"),
         },
         E::MissingStructField { field, .. } => format!("add `{field}: …`"),
         E::DuplicateStructField { .. } => "keep one of them".into(),
@@ -211,7 +231,7 @@ fn syntax_problem(name: &str, text: &str, error: &SpannedError) -> Problem {
         E::ExceededRecursionLimit => format!("brackets may be nested {MAX_DEPTH} deep"),
         E::UnclosedBlockComment => "close it with `*/`".into(),
         E::TrailingCharacters => "the scene ended before this; look for a bracket too many".into(),
-        _ => "`intrados schema --page` lists every field with an example".into(),
+        _ => format!("{page} lists every field with an example"),
     };
     let what: String = error
         .code

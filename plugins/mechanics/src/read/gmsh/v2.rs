@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::{Fault, Kind, MAX_COUNT, Raw, RawElement, Source, v4::physical_names};
+use super::{Fault, Kind, MAX_COUNT, Raw, RawElement, SUPPORTED, Source, v4::physical_names};
 
 pub(super) fn read(mut source: Source<'_>) -> Result<Raw, Fault> {
     source.expect("$EndMeshFormat")?;
@@ -54,11 +54,9 @@ fn element(source: &mut Source<'_>, raw: &mut Raw) -> Result<RawElement, Fault> 
     let label = source.tag()?;
     let line = source.line();
     let number = source.int()?;
-    let kind = Kind::of(i64::from(number));
+    let kind = Kind(i64::from(number));
     let width = kind.nodes().ok_or_else(|| {
-        source.fault(format!(
-            "element type {number} is not known; supported are 5 (hexahedron of 8 nodes), 3, 1, 15"
-        ))
+        source.fault(format!("element type {number} is not known; supported are {SUPPORTED}"))
     })?;
     let mut physical = Vec::new();
     for t in 0..source.count(2, 64)? {
@@ -67,13 +65,10 @@ fn element(source: &mut Source<'_>, raw: &mut Raw) -> Result<RawElement, Fault> 
             physical.push(tag);
         }
     }
-    let mut nodes = [0; 8];
-    for n in 0..width {
-        let node = source.tag()?;
-        if let Some(slot) = nodes.get_mut(n) {
-            *slot = node;
-        }
+    let first = raw.nodes.len();
+    for _ in 0..width {
+        raw.nodes.push(source.tag()?);
     }
     let group = raw.group(kind.dimension(), physical);
-    Ok(RawElement { label, nodes, kind, group, line })
+    Ok(RawElement { label, first, kind, group, line })
 }

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use glam::DVec3;
 
-use super::{Fault, Kind, MAX_COUNT, Raw, RawElement, Source, quote};
+use super::{Fault, Kind, MAX_COUNT, Raw, RawElement, SUPPORTED, Source, quote};
 
 /// Entities of a file.
 const MAX_ENTITIES: usize = 10_000_000;
@@ -157,9 +157,9 @@ fn read_elements(source: &mut Source<'_>, raw: &mut Raw, entities: &Entities) ->
     source.pass(2)?;
     for _ in 0..blocks {
         let (dimension, tag, number) = (source.int()?, source.int()?, source.int()?);
-        let kind = Kind::of(i64::from(number));
+        let kind = Kind(i64::from(number));
         let unknown = |source: &Source<'_>| {
-            source.fault(format!("element type {number} is not known; supported are 5 (hexahedron of 8 nodes), 3, 1, 15"))
+            source.fault(format!("element type {number} is not known; supported are {SUPPORTED}"))
         };
         let width = kind.nodes().ok_or_else(|| unknown(source))?;
         let count = source.count(2, total.saturating_sub(raw.elements.len()))?;
@@ -168,14 +168,11 @@ fn read_elements(source: &mut Source<'_>, raw: &mut Raw, entities: &Entities) ->
         for _ in 0..count {
             let label = source.tag()?;
             let line = source.line();
-            let mut nodes = [0; 8];
-            for n in 0..width {
-                let node = source.tag()?;
-                if let Some(slot) = nodes.get_mut(n) {
-                    *slot = node;
-                }
+            let first = raw.nodes.len();
+            for _ in 0..width {
+                raw.nodes.push(source.tag()?);
             }
-            raw.elements.push(RawElement { label, nodes, kind, group, line });
+            raw.elements.push(RawElement { label, first, kind, group, line });
         }
     }
     if raw.elements.len() == total {

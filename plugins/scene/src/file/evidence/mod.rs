@@ -27,7 +27,7 @@ pub use face::{Face, FaceError};
 pub(crate) use place::{no_member, place};
 pub(crate) use table::{RawReading, read as read_table};
 
-use super::{SceneFile, Slices, known_schema, read};
+use super::{PAGE, SceneFile, Slices, known_schema, read};
 use crate::{
     LoadError,
     load::Sources,
@@ -431,7 +431,7 @@ pub(crate) fn examples() -> String {
 /// # Errors
 /// A problem whose place is `name:line:column`.
 pub fn parse(name: &str, text: &str) -> Result<EvidenceFile, Problem> {
-    let file: EvidenceFile = read(name, text)?;
+    let file: EvidenceFile = read(name, text, PAGE)?;
     known_schema(name, text, &file.schema, SCHEMA)?;
     Ok(file)
 }
