@@ -218,9 +218,7 @@ impl Body {
             s.as_ref().map_or(0.0, |s| 1000.0 * length / s.spacing_mm.max(10.0))
         };
         let of_bar = |r: &Option<Reinforcement>, length: f32| {
-            let count = |b: &Bars| match *b {
-                Bars::Around { count, .. } | Bars::Row { count, .. } => count as f32,
-            };
+            let count = |b: &Bars| b.size().0 as f32;
             r.as_ref().map_or(0.0, |r| {
                 r.bars.iter().map(count).sum::<f32>() + stirrups(&r.stirrups, length)
             })
@@ -801,27 +799,26 @@ impl Checker<'_> {
             c.grade(&r.steel, r.f_y_mpa);
             let mut thickest = 0.0_f32;
             c.each("bars", &r.bars, |c, bars| {
-                let diameter = match *bars {
-                    Bars::Around { count, diameter_mm } => {
+                let (diameter, [from, to]) = (bars.size().1, bars.span());
+                if !(0.0 <= from && from < to && to <= 1.0) {
+                    c.error("from", "RANGE", "bars run from a place to a later one, both from 0 to 1");
+                }
+                match *bars {
+                    Bars::Around { count, .. } => {
                         c.count("count", count, 3, 1000);
                         if !round && count < 4 {
                             c.error("count", "RANGE", "a section with corners needs at least 4 bars around");
                         }
-                        diameter_mm
                     }
-                    Bars::Row { side_deg, count, diameter_mm, inset_mm, from, to, f_y_mpa } => {
+                    Bars::Row { side_deg, count, inset_mm, f_y_mpa, .. } => {
                         c.count("count", count, 1, 1000);
                         c.within("inset_mm", inset_mm, 0.0, 500.0 * least_m);
                         c.grade(&r.steel, f_y_mpa);
-                        if !(0.0 <= from && from < to && to <= 1.0) {
-                            c.error("from", "RANGE", "bars run from a place to a later one, both from 0 to 1");
-                        }
                         if ![0.0, 90.0, 180.0, 270.0].contains(&side_deg) || round {
                             c.error("side_deg", "RANGE", "a row lies at side 0, 90, 180 or 270 of a section with corners");
                         }
-                        diameter_mm
                     }
-                };
+                }
                 c.within("diameter_mm", diameter, 1.0, 100.0);
                 thickest = thickest.max(diameter);
             });

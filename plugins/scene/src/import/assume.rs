@@ -142,10 +142,7 @@ type Laid = (Vec<Bars>, (f32, f32));
 fn around(area: f64, fewest: u32, least: f64, way: f64) -> Laid {
     let (count, diameter_mm) = bars(area, way, 0.4, least);
     let link = (0.25 * diameter_mm).max(6.0);
-    (
-        vec![Bars::Around { count: count.max(fewest), diameter_mm }],
-        (link, (20.0 * diameter_mm).min(400.0)),
-    )
+    (vec![Bars::around(count.max(fewest), diameter_mm)], (link, (20.0 * diameter_mm).min(400.0)))
 }
 
 fn wall(m: &Measures, cover: f64) -> Laid {
@@ -236,8 +233,7 @@ mod tests {
     }
 
     fn area(bars: &Bars) -> f64 {
-        let (Bars::Around { count, diameter_mm } | Bars::Row { count, diameter_mm, .. }) = *bars;
-        f64::from(count) * std::f64::consts::FRAC_PI_4 * f64::from(diameter_mm).powi(2) * 1e-6
+        f64::from(bars.area())
     }
 
     #[test]

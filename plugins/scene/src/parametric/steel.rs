@@ -43,13 +43,11 @@ pub(crate) fn bars(outline: Outline, r: &Reinforcement) -> Vec<Laid> {
     let stirrup = r.stirrups.as_ref().map_or(0.0, |s| s.diameter_mm);
     let mut list = Vec::new();
     for bars in &r.bars {
-        let (Bars::Around { count, diameter_mm } | Bars::Row { count, diameter_mm, .. }) = *bars;
+        let ((count, diameter_mm), span) = (bars.size(), bars.span());
         let first = (r.cover_mm + stirrup + 0.5 * diameter_mm) / 1000.0;
-        let (inset, span, f_y_mpa) = match *bars {
-            Bars::Row { inset_mm, from, to, f_y_mpa, .. } => {
-                (first + inset_mm / 1000.0, [from, to], f_y_mpa)
-            }
-            Bars::Around { .. } => (first, [0.0, 1.0], None),
+        let (inset, f_y_mpa) = match *bars {
+            Bars::Row { inset_mm, f_y_mpa, .. } => (first + inset_mm / 1000.0, f_y_mpa),
+            Bars::Around { .. } => (first, None),
         };
         // Farther in, but as wide as the first layer.
         let inner = |half: Vec2, side_deg: f32| match side_deg as i32 {

@@ -168,6 +168,13 @@ pub enum Bars {
         count: u32,
         /// Of one bar, mm.
         diameter_mm: f32,
+        /// Where they begin on the axis, 0 to 1. What begins or ends within 100 mm of a face that is
+        /// held along the axis goes on into what holds it.
+        #[serde(default)]
+        from: f32,
+        /// Where they end on the axis (starter bars, curtailed bars), 0 to 1.
+        #[serde(default = "whole")]
+        to: f32,
     },
     /// A row along one side.
     Row {
@@ -180,10 +187,11 @@ pub enum Bars {
         /// How much farther in than the first layer, mm: a second layer.
         #[serde(default)]
         inset_mm: f32,
-        /// Where they begin on the axis, 0 to 1.
+        /// Where they begin on the axis, 0 to 1. What begins or ends within 100 mm of a face that is
+        /// held along the axis goes on into what holds it.
         #[serde(default)]
         from: f32,
-        /// Where they end (curtailed bars), 0 to 1.
+        /// Where they end on the axis (starter bars, curtailed bars), 0 to 1.
         #[serde(default = "whole")]
         to: f32,
         /// Yield stress where it is another than that of the rest, MPa.
@@ -193,10 +201,41 @@ pub enum Bars {
 }
 
 impl Bars {
+    /// Bars around the section along the whole of the axis.
+    #[must_use]
+    pub fn around(count: u32, diameter_mm: f32) -> Self {
+        Self::Around { count, diameter_mm, from: 0.0, to: 1.0 }
+    }
+
     /// A layer of bars along the whole of one side.
     #[must_use]
     pub fn row(side_deg: f32, count: u32, diameter_mm: f32) -> Self {
         Self::Row { side_deg, count, diameter_mm, inset_mm: 0.0, from: 0.0, to: 1.0, f_y_mpa: None }
+    }
+
+    /// How many bars, of what diameter, mm.
+    #[must_use]
+    pub fn size(&self) -> (u32, f32) {
+        match *self {
+            Self::Around { count, diameter_mm, .. } | Self::Row { count, diameter_mm, .. } => {
+                (count, diameter_mm)
+            }
+        }
+    }
+
+    /// From where to where on the axis, 0 to 1.
+    #[must_use]
+    pub fn span(&self) -> [f32; 2] {
+        match *self {
+            Self::Around { from, to, .. } | Self::Row { from, to, .. } => [from, to],
+        }
+    }
+
+    /// Area of all its bars together, m².
+    #[must_use]
+    pub fn area(&self) -> f32 {
+        let (count, diameter_mm) = self.size();
+        count as f32 * diameter_mm * diameter_mm * std::f32::consts::FRAC_PI_4 * 1e-6
     }
 }
 
