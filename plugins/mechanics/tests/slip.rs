@@ -92,20 +92,77 @@ fn a_bar_is_pulled_out() {
     assert!(march.advance(3.0, 0.0, &Job::default(), |_, _| Ok(())).is_err());
 }
 
+fn scene_of(text: &str) -> Scene {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scene.ron");
+    std::fs::write(&path, text).unwrap();
+    Scene::load(&path, &Job::default()).unwrap()
+}
+
+/// The steel of a column of 2 m on a footing, cover 40 mm, with these bars.
+fn column(reinforcement: &str) -> Vec<Steel> {
+    let scene = scene_of(&format!(
+        "(schema: \"intrados.scene/1\",
+          members: [(id: \"C\", concrete: Some(\"C30/37\"), body: Column(section: Rectangle(width_m: 0.4, depth_m: 0.4), height_m: 2,
+            reinforcement: (cover_mm: 40, {reinforcement})))],
+          supports: [(member: \"C\", place: Start, hold: Fixed)])"
+    ));
+    let assembly = &scene.structure.assemblies[0];
+    prepare(&scene, assembly, Meshing::default(), &Job::default()).unwrap().model.steel
+}
+
+/// Where a bar begins and ends above the footing, m.
+fn heights(steel: &Steel) -> [f64; 2] {
+    [steel.pieces[0].ends[0].y, steel.pieces[steel.pieces.len() - 1].ends[1].y]
+}
+
+/// Anchored and hooked ends do not slip and go on into the footing; straight ones slip, and end
+/// where they are told.
+#[test]
+fn ends_of_bars_hold_as_the_scene_says() {
+    for (ends, anchored, reaches) in [
+        ("", [true, true], [0.0, 1.96]),
+        (", ends: (Hooked, Straight)", [true, false], [0.0, 1.96]),
+        (", ends: (Straight, Anchored)", [false, true], [0.04, 1.96]),
+    ] {
+        let bars = format!("bond: Slip, bars: [Around(count: 4, diameter_mm: 20{ends})]");
+        for steel in column(&bars) {
+            assert_eq!(steel.bond.as_ref().unwrap().anchored, anchored, "{ends}");
+            let off = heights(&steel).into_iter().zip(reaches).map(|(a, b)| (a - b).abs());
+            assert!(off.fold(0.0, f64::max) < 1e-4, "{ends}: {:?}", heights(&steel));
+        }
+    }
+    // Where nothing slips, ends are all the same.
+    let perfect = column("bars: [Around(count: 4, diameter_mm: 20, ends: (Straight, Straight))]");
+    assert!(perfect.len() == 4 && perfect.iter().all(|steel| steel.bond.is_none()));
+}
+
+/// Starter bars come out of the footing and end above it; the bars of the column stand on it.
+#[test]
+fn starter_bars_begin_in_the_footing_and_end_above_it() {
+    let steel = column(
+        "bond: Slip, bars: [
+            Around(count: 4, diameter_mm: 20, to: 0.4, ends: (Anchored, Straight)),
+            Around(count: 4, diameter_mm: 16, from: 0.1, ends: (Straight, Anchored)),
+        ]",
+    );
+    assert_eq!(steel.len(), 8);
+    for (steel, wanted) in steel.iter().zip([[0.0, 0.8]; 4].into_iter().chain([[0.2, 1.96]; 4])) {
+        let off = heights(steel).into_iter().zip(wanted).map(|(a, b)| (a - b).abs());
+        assert!(off.fold(0.0, f64::max) < 1e-4, "{}: {:?}", steel.name, heights(steel));
+    }
+}
+
 /// A beam of a scene that cracks, 3 m long, three bars of 16 mm.
 fn cracked(bond: &str, element: f64) -> Outcome {
-    let text = format!(
+    let scene = scene_of(&format!(
         "(schema: \"intrados.scene/1\",
           members: [(id: \"B\", concrete: Some(\"C30/37\"), at: (0, 0, 0), body: Beam(section: Rectangle(width_m: 0.2, depth_m: 0.3), length_m: 3,
             reinforcement: (cover_mm: 30, bond: {bond}, bars: [Row(side_deg: 180, count: 3, diameter_mm: 16)])))],
           supports: [(member: \"B\", place: Surface(from: 0, to: 0, side_deg: 180), hold: Fixed),
             (member: \"B\", place: Surface(from: 1, to: 1, side_deg: 180), hold: Directions(x: false, y: true, z: true))],
           loads: [(name: \"load\", action: Line(force_kn_m: (0, -15, 0)), history: [(28, 0), (29, 1)])])"
-    );
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("scene.ron");
-    std::fs::write(&path, text).unwrap();
-    let scene = Scene::load(&path, &Job::default()).unwrap();
+    ));
     let prepared = prepare(
         &scene,
         &scene.structure.assemblies[0],

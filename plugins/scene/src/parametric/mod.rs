@@ -299,7 +299,7 @@ impl Builder<'_> {
             let cover = (r.cover_mm / 1000.0).min(0.4 * length);
             let mut last: Option<(f32, [f32; 2], usize)> = None;
             for (i, bar) in steel::bars(outline, r).into_iter().enumerate() {
-                let (diameter, ends) = (bar.diameter, bar.ends(length, cover));
+                let (diameter, ends) = (bar.diameter, bar.reach(length, cover));
                 // Bars of one diameter and length share a mesh.
                 let mesh = match last {
                     Some((d, e, mesh)) if d == diameter && e == ends => mesh,

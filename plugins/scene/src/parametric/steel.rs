@@ -5,7 +5,7 @@ use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
 use glam::{Vec2, Vec3};
 
-use crate::structure::{Bars, Reinforcement, Stirrups};
+use crate::structure::{BarEnd, Bars, Reinforcement, Stirrups};
 
 /// The outline that steel keeps its cover from.
 #[derive(Debug, Clone, Copy)]
@@ -27,13 +27,15 @@ pub(crate) struct Laid {
     pub(crate) diameter: f32,
     /// From where to where on the axis, 0 to 1.
     pub(crate) span: [f32; 2],
+    /// How its ends hold.
+    pub(crate) ends: [BarEnd; 2],
     /// Yield stress where it is another than that of the rest, MPa.
     pub(crate) f_y_mpa: Option<f32>,
 }
 
 impl Laid {
     /// Where it begins and ends along an axis of `length`, `cover` away from both faces, m.
-    pub(crate) fn ends(&self, length: f32, cover: f32) -> [f32; 2] {
+    pub(crate) fn reach(&self, length: f32, cover: f32) -> [f32; 2] {
         self.span.map(|share| (share * length).clamp(cover, length - cover))
     }
 }
@@ -72,7 +74,8 @@ pub(crate) fn bars(outline: Outline, r: &Reinforcement) -> Vec<Laid> {
             }
         };
         let diameter = diameter_mm / 1000.0;
-        list.extend(places.into_iter().map(|at| Laid { at, diameter, span, f_y_mpa }));
+        let ends = bars.ends();
+        list.extend(places.into_iter().map(|at| Laid { at, diameter, span, ends, f_y_mpa }));
     }
     list
 }

@@ -136,9 +136,24 @@ pub enum Bond {
     /// They move with the concrete around them.
     #[default]
     Perfect,
-    /// They slip by the law of the CEB (fib Model Code 2010 §6.1.1, good conditions), anchored at
-    /// their ends.
+    /// They slip by the law of the CEB (fib Model Code 2010 §6.1.1, good conditions), but where
+    /// their ends are anchored.
     Slip,
+}
+
+/// How an end of a bar holds, where bars slip.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub enum BarEnd {
+    /// By a plate, or beyond what is computed: it does not slip. At a face that is held along the
+    /// axis it goes on into what holds that.
+    #[default]
+    Anchored,
+    /// By a bend, a hook or a loop (EN 1992-1-1, 8.4.1): it does not slip either. The tenths of a
+    /// millimetre by which a hook gives way are left out, and in compression, where 8.4.1 (3) counts
+    /// no hook, the concrete before it holds as well.
+    Hooked,
+    /// By bond alone: it slips.
+    Straight,
 }
 
 impl Body {
@@ -169,12 +184,15 @@ pub enum Bars {
         /// Of one bar, mm.
         diameter_mm: f32,
         /// Where they begin on the axis, 0 to 1. What begins or ends within 100 mm of a face that is
-        /// held along the axis goes on into what holds it.
+        /// held along the axis goes on into what holds it, but for straight ends.
         #[serde(default)]
         from: f32,
         /// Where they end on the axis (starter bars, curtailed bars), 0 to 1.
         #[serde(default = "whole")]
         to: f32,
+        /// How their first and their last end hold, where they slip.
+        #[serde(default)]
+        ends: [BarEnd; 2],
     },
     /// A row along one side.
     Row {
@@ -188,12 +206,15 @@ pub enum Bars {
         #[serde(default)]
         inset_mm: f32,
         /// Where they begin on the axis, 0 to 1. What begins or ends within 100 mm of a face that is
-        /// held along the axis goes on into what holds it.
+        /// held along the axis goes on into what holds it, but for straight ends.
         #[serde(default)]
         from: f32,
         /// Where they end on the axis (starter bars, curtailed bars), 0 to 1.
         #[serde(default = "whole")]
         to: f32,
+        /// How their first and their last end hold, where they slip.
+        #[serde(default)]
+        ends: [BarEnd; 2],
         /// Yield stress where it is another than that of the rest, MPa.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         f_y_mpa: Option<f32>,
@@ -204,13 +225,22 @@ impl Bars {
     /// Bars around the section along the whole of the axis.
     #[must_use]
     pub fn around(count: u32, diameter_mm: f32) -> Self {
-        Self::Around { count, diameter_mm, from: 0.0, to: 1.0 }
+        Self::Around { count, diameter_mm, from: 0.0, to: 1.0, ends: [BarEnd::Anchored; 2] }
     }
 
     /// A layer of bars along the whole of one side.
     #[must_use]
     pub fn row(side_deg: f32, count: u32, diameter_mm: f32) -> Self {
-        Self::Row { side_deg, count, diameter_mm, inset_mm: 0.0, from: 0.0, to: 1.0, f_y_mpa: None }
+        Self::Row {
+            side_deg,
+            count,
+            diameter_mm,
+            inset_mm: 0.0,
+            from: 0.0,
+            to: 1.0,
+            ends: [BarEnd::Anchored; 2],
+            f_y_mpa: None,
+        }
     }
 
     /// How many bars, of what diameter, mm.
@@ -228,6 +258,14 @@ impl Bars {
     pub fn span(&self) -> [f32; 2] {
         match *self {
             Self::Around { from, to, .. } | Self::Row { from, to, .. } => [from, to],
+        }
+    }
+
+    /// How their first and their last end hold, where they slip.
+    #[must_use]
+    pub fn ends(&self) -> [BarEnd; 2] {
+        match *self {
+            Self::Around { ends, .. } | Self::Row { ends, .. } => ends,
         }
     }
 

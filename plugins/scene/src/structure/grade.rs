@@ -161,7 +161,8 @@ mod tests {
     /// Starter bars count where they are, not on top of what begins above them.
     #[test]
     fn the_area_of_bars_is_that_of_the_section_that_has_most() {
-        let around = |from, to| Bars::Around { count: 4, diameter_mm: 20.0, from, to };
+        let ends = Default::default();
+        let around = |from, to| Bars::Around { count: 4, diameter_mm: 20.0, from, to, ends };
         let with = |bars| Reinforcement {
             cover_mm: 40.0,
             steel: "B500B".into(),
