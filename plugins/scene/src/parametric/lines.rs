@@ -82,11 +82,11 @@ fn prism(
         let (cover, grade) = ((r.cover_mm / 1000.0).min(0.4 * length), r.grade());
         let of =
             |f_y_mpa: Option<f32>| grade.map(|g| if f_y_mpa.is_some() { g.at(f_y_mpa) } else { g });
-        lines.extend(bars(outline, r).into_iter().enumerate().map(|(i, bar)| {
+        lines.extend(bars(outline, r, length).into_iter().enumerate().map(|(i, bar)| {
             let line = bar.reach(length, cover).map(|z| bar.at.extend(z)).to_vec();
             SteelLine {
                 grade: of(bar.f_y_mpa),
-                bond: r.bond,
+                bond: bar.bond,
                 ends: bar.ends,
                 ..SteelLine::new(format!("bar {}", i + 1), Part::Bar, bar.diameter, line)
             }

@@ -133,7 +133,7 @@ pub struct Reinforcement {
 /// Bond of bars.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub enum Bond {
-    /// They move with the concrete around them.
+    /// They move with the concrete around them; but lapped ones slip.
     #[default]
     Perfect,
     /// They slip by the law of the CEB (fib Model Code 2010 §6.1.1, good conditions), but where
@@ -173,6 +173,27 @@ fn b500() -> String {
     "B500B".into()
 }
 
+/// A lap: over its length two bars lie side by side, and hand on their force by bond alone. Their
+/// ends in it are straight, and lapped bars slip whatever `bond` says, since with perfect bond the
+/// shortest lap would do.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Lap {
+    /// Its middle on the axis, 0 to 1.
+    pub at: f32,
+    /// From the end of one bar to the end of the other, mm.
+    pub length_mm: f32,
+}
+
+impl Lap {
+    /// From where to where it reaches on an axis of this length (m), 0 to 1.
+    #[must_use]
+    pub(crate) fn span(&self, length_m: f32) -> [f32; 2] {
+        let half = 0.5 * self.length_mm / (1000.0 * length_m);
+        [self.at - half, self.at + half]
+    }
+}
+
 /// Longitudinal bars.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -193,6 +214,10 @@ pub enum Bars {
         /// How their first and their last end hold, where they slip.
         #[serde(default)]
         ends: [BarEnd; 2],
+        /// Where each of them is two bars, one of which takes over from the other: in their order
+        /// along the axis.
+        #[serde(default)]
+        laps: Vec<Lap>,
     },
     /// A row along one side.
     Row {
@@ -215,6 +240,10 @@ pub enum Bars {
         /// How their first and their last end hold, where they slip.
         #[serde(default)]
         ends: [BarEnd; 2],
+        /// Where each of them is two bars, one of which takes over from the other: in their order
+        /// along the axis.
+        #[serde(default)]
+        laps: Vec<Lap>,
         /// Yield stress where it is another than that of the rest, MPa.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         f_y_mpa: Option<f32>,
@@ -225,7 +254,14 @@ impl Bars {
     /// Bars around the section along the whole of the axis.
     #[must_use]
     pub fn around(count: u32, diameter_mm: f32) -> Self {
-        Self::Around { count, diameter_mm, from: 0.0, to: 1.0, ends: [BarEnd::Anchored; 2] }
+        Self::Around {
+            count,
+            diameter_mm,
+            from: 0.0,
+            to: 1.0,
+            ends: [BarEnd::Anchored; 2],
+            laps: Vec::new(),
+        }
     }
 
     /// A layer of bars along the whole of one side.
@@ -239,6 +275,7 @@ impl Bars {
             from: 0.0,
             to: 1.0,
             ends: [BarEnd::Anchored; 2],
+            laps: Vec::new(),
             f_y_mpa: None,
         }
     }
@@ -269,7 +306,15 @@ impl Bars {
         }
     }
 
-    /// Area of all its bars together, m².
+    /// Where they are lapped, in their order along the axis.
+    #[must_use]
+    pub fn laps(&self) -> &[Lap] {
+        match self {
+            Self::Around { laps, .. } | Self::Row { laps, .. } => laps,
+        }
+    }
+
+    /// Area of all its bars together, m²; of lapped ones outside of their laps.
     #[must_use]
     pub fn area(&self) -> f32 {
         let (count, diameter_mm) = self.size();

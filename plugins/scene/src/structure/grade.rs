@@ -131,7 +131,7 @@ impl Reinforcement {
         Some(Grade::named(&self.steel)?.at(self.f_y_mpa))
     }
 
-    /// Area of its longitudinal bars in the section that has most of them, m².
+    /// Area of its longitudinal bars in the section that has most of them, m²; `laps` not counted.
     #[must_use]
     pub fn area(&self) -> f32 {
         // Going along the axis, there are more only where some begin.
@@ -161,8 +161,14 @@ mod tests {
     /// Starter bars count where they are, not on top of what begins above them.
     #[test]
     fn the_area_of_bars_is_that_of_the_section_that_has_most() {
-        let ends = Default::default();
-        let around = |from, to| Bars::Around { count: 4, diameter_mm: 20.0, from, to, ends };
+        let around = |from, to| Bars::Around {
+            count: 4,
+            diameter_mm: 20.0,
+            from,
+            to,
+            ends: Default::default(),
+            laps: Vec::new(),
+        };
         let with = |bars| Reinforcement {
             cover_mm: 40.0,
             steel: "B500B".into(),
