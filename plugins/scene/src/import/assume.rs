@@ -6,7 +6,7 @@ use crate::{
     Frame, MemberKind, Part,
     file::Assumed,
     parametric,
-    structure::{ASSUMED_CONCRETE, Bars, Grade, Reinforcement, Stirrups},
+    structure::{ASSUMED_CONCRETE, Bars, Grade, Reinforcement, Stirrups, fctm},
 };
 
 /// Steel of bars where nothing is said of it.
@@ -82,11 +82,6 @@ fn bars(area: f64, width: f64, most: f64, least: f64) -> (u32, f32) {
         }
     }
     (found.0.min(1000.0) as u32, found.1 as f32)
-}
-
-/// Mean tensile strength of EN 1992-1-1, table 3.1, MPa.
-fn fctm(fck: f64) -> f64 {
-    if fck <= 50.0 { 0.3 * fck.powf(2.0 / 3.0) } else { 2.12 * (1.0 + (fck + 8.0) / 10.0).ln() }
 }
 
 /// The least reinforcement of EN 1992-1-1 for a member, none of one that has no room for it.
