@@ -545,19 +545,26 @@ impl<'a> Watch<'a> {
         };
         let bars = self.bars(part);
         let age = |time: f64| (time - self.prepared.attacked).max(0.0);
+        let of = |bars: &Vec<Bars>, age| (!bars.is_empty()).then(|| corrosion.lost(bars, age));
+        // What is lost by a moment, to the minute: the course tells of now and of the end, too.
+        let mut known: BTreeMap<i64, [Option<Lost>; ZONES]> = BTreeMap::new();
+        let mut lost = |time: f64| {
+            let minute = (age(time) / 60.0).round() as i64;
+            *known.entry(minute).or_insert_with(|| bars.each_ref().map(|bars| of(bars, age(time))))
+        };
         let told = &mut self.parts[part];
-        for (zones, age) in [(&mut told.now, age(now)), (&mut told.last, age(end))] {
-            for (told, bars) in zones.iter_mut().zip(&bars).filter(|(_, bars)| !bars.is_empty()) {
-                let Lost { share, std_error, .. } = corrosion.lost(bars, age);
+        for (zones, time) in [(&mut told.now, now), (&mut told.last, end)] {
+            for (told, lost) in zones.iter_mut().zip(lost(time)) {
+                let Some(Lost { share, std_error, .. }) = lost else { continue };
                 (told.steel_lost, told.steel_lost_std_error) = (Some(share), std_error);
                 told.damage = together([told.concrete, share]);
             }
         }
         for passed in &mut told.course {
-            let age = age(passed.years * YEAR);
-            for (damage, bars) in passed.damage.iter_mut().zip(&bars).filter(|(_, b)| !b.is_empty())
-            {
-                *damage = together([*damage, corrosion.lost(bars, age).share]);
+            for (damage, lost) in passed.damage.iter_mut().zip(lost(passed.years * YEAR)) {
+                if let Some(Lost { share, .. }) = lost {
+                    *damage = together([*damage, share]);
+                }
             }
         }
         Rust::of(corrosion, &bars, age(now))
