@@ -27,7 +27,9 @@ use intrados_mechanics::{
     member::{
         ElasticMatter, Handed, Meshing, Part, Prepared, elastic, largest_element, prepare_within,
     },
-    model::{Failure, Gauge, History, MarchSettings, Point, SteelKind, Step, System, past_peak},
+    model::{
+        Failure, Gauge, History, MarchSettings, Point, Steel, SteelKind, Step, System, past_peak,
+    },
     tensor::Principal,
 };
 use intrados_scene::{Assembly, Frame, MemberKind, Scene, structure::Body};
@@ -651,7 +653,7 @@ impl<'a> Watch<'a> {
     fn held(&self, part: usize, history: &History) -> [Option<f64>; ZONES] {
         let model = &self.prepared.model;
         let axis = self.parts[part].frame.axis.as_dvec3().normalize_or_zero();
-        let mut places: Vec<(usize, DVec3, f64, f64)> = Vec::new();
+        let mut places: Vec<(usize, DVec3, &Steel, f64)> = Vec::new();
         for (steel, works) in model
             .steel
             .iter()
@@ -663,16 +665,16 @@ impl<'a> Watch<'a> {
             {
                 let middle = 0.5 * (piece.ends[0] + piece.ends[1]);
                 let zone = zone_at(self.parts[part].place(middle).0);
-                places.push((zone, middle - axis * middle.dot(axis), steel.area, work.stress));
+                places.push((zone, middle - axis * middle.dot(axis), steel, work.stress));
             }
         }
         let matter = |zone: usize| {
-            let (area, across, stress) = places
+            let (steel, across, stress) = places
                 .iter()
                 .filter(|p| p.0 == zone)
                 .map(|p| (p.2, p.1, p.3))
                 .max_by(|a, b| a.2.total_cmp(&b.2))?;
-            let diameter = (4.0 * area / std::f64::consts::PI).sqrt();
+            let diameter = steel.diameter();
             let apart = places
                 .iter()
                 .map(|p| p.1.distance(across))

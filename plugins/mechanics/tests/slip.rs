@@ -45,6 +45,7 @@ fn bar_in(model: &Model, length: f64, bar: Bar) -> Steel {
         name: "bar".into(),
         pieces,
         area: AREA,
+        count: 1.0,
         kind: SteelKind::Bar(bar),
         rust: None,
         gone: Vec::new(),

@@ -65,6 +65,7 @@ impl Case {
                 name,
                 pieces,
                 area,
+                count: 1.0,
                 kind: SteelKind::Stressed(steel, stress),
                 rust: None,
                 gone: Vec::new(),

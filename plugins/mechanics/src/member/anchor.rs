@@ -162,6 +162,7 @@ impl Draft<'_> {
             name,
             pieces,
             area,
+            count: 1.0,
             kind: SteelKind::Bar(bar),
             rust: None,
             gone: Vec::new(),

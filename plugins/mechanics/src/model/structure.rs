@@ -793,7 +793,7 @@ impl<'m> System<'m> {
 fn crossed(model: &Model) -> Vec<[f64; 3]> {
     let mut cracks = vec![[0.0; 3]; model.mesh.hexes.len()];
     for steel in model.steel.iter().filter(|s| matches!(s.kind, super::SteelKind::Bar(_))) {
-        let diameter = (4.0 * steel.area / std::f64::consts::PI).sqrt();
+        let diameter = steel.diameter();
         for piece in &steel.pieces {
             let volume = model.mesh.hex_volume(piece.host as u32);
             let along = (piece.ends[1] - piece.ends[0]).abs().to_array();
@@ -857,4 +857,45 @@ fn stiffened(
         None => law(point, strain),
     };
     hex8::integrate(Kind::Assumed, corners, u, &mut Modes::default(), law)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        element::rod::Piece,
+        material::steel::Bar,
+        mesh::block,
+        model::{Steel, SteelKind},
+    };
+
+    /// Three bars of 20 mm in .3 × .4 m keep 5.4 · 3 · π φ/(4 b h) cracks a metre apart, whether each
+    /// is told by itself or one stands for all.
+    #[test]
+    fn lumped_bars_keep_as_many_cracks_apart_as_single_ones() {
+        let (diameter, across): (f64, [f64; 2]) = (0.02, [0.3, 0.4]);
+        let steel = |count: f64| Steel {
+            name: "bars".into(),
+            pieces: vec![Piece {
+                host: 0,
+                segment: 0,
+                ends: [0.0, 1.0].map(|x| DVec3::new(x, 0.15, 0.2)),
+                natural: [-1.0, 1.0].map(|x| DVec3::new(x, 0.0, 0.0)),
+                along: [0.0, 1.0],
+            }],
+            area: count * 0.25 * std::f64::consts::PI * diameter * diameter,
+            count,
+            kind: SteelKind::Bar(Bar::elastic(200e9)),
+            rust: None,
+            gone: Vec::new(),
+            bond: None,
+            displaces: true,
+        };
+        let wanted = 5.4 * 3.0 * 0.25 * std::f64::consts::PI * diameter / (across[0] * across[1]);
+        for steel in [vec![steel(3.0)], vec![steel(1.0); 3]] {
+            let mesh = block(&[0.0, 1.0], &[0.0, across[0]], &[0.0, across[1]], "block").unwrap();
+            let [along, ..] = crossed(&Model { mesh, steel, ..Model::default() })[0];
+            assert!((along / wanted - 1.0).abs() < 1e-9, "{along} {wanted}");
+        }
+    }
 }
