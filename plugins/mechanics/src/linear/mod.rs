@@ -18,6 +18,7 @@
 mod constraint;
 mod element;
 mod flat;
+mod free;
 mod heat;
 mod law;
 mod link;
