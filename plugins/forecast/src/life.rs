@@ -27,7 +27,9 @@ use intrados_mechanics::{
     member::{
         ElasticMatter, Handed, Meshing, Part, Prepared, elastic, largest_element, prepare_within,
     },
-    model::{Failure, Gauge, History, MarchSettings, Point, SteelKind, Step, System, past_peak},
+    model::{
+        Failure, Gauge, History, MarchSettings, Point, Steel, SteelKind, Step, System, past_peak,
+    },
     tensor::Principal,
 };
 use intrados_scene::{Assembly, Frame, MemberKind, Scene, structure::Body};
@@ -545,19 +547,26 @@ impl<'a> Watch<'a> {
         };
         let bars = self.bars(part);
         let age = |time: f64| (time - self.prepared.attacked).max(0.0);
+        let of = |bars: &Vec<Bars>, age| (!bars.is_empty()).then(|| corrosion.lost(bars, age));
+        // What is lost by a moment, to the minute: the course tells of now and of the end, too.
+        let mut known: BTreeMap<i64, [Option<Lost>; ZONES]> = BTreeMap::new();
+        let mut lost = |time: f64| {
+            let minute = (age(time) / 60.0).round() as i64;
+            *known.entry(minute).or_insert_with(|| bars.each_ref().map(|bars| of(bars, age(time))))
+        };
         let told = &mut self.parts[part];
-        for (zones, age) in [(&mut told.now, age(now)), (&mut told.last, age(end))] {
-            for (told, bars) in zones.iter_mut().zip(&bars).filter(|(_, bars)| !bars.is_empty()) {
-                let Lost { share, std_error, .. } = corrosion.lost(bars, age);
+        for (zones, time) in [(&mut told.now, now), (&mut told.last, end)] {
+            for (told, lost) in zones.iter_mut().zip(lost(time)) {
+                let Some(Lost { share, std_error, .. }) = lost else { continue };
                 (told.steel_lost, told.steel_lost_std_error) = (Some(share), std_error);
                 told.damage = together([told.concrete, share]);
             }
         }
         for passed in &mut told.course {
-            let age = age(passed.years * YEAR);
-            for (damage, bars) in passed.damage.iter_mut().zip(&bars).filter(|(_, b)| !b.is_empty())
-            {
-                *damage = together([*damage, corrosion.lost(bars, age).share]);
+            for (damage, lost) in passed.damage.iter_mut().zip(lost(passed.years * YEAR)) {
+                if let Some(Lost { share, .. }) = lost {
+                    *damage = together([*damage, share]);
+                }
             }
         }
         Rust::of(corrosion, &bars, age(now))
@@ -644,7 +653,7 @@ impl<'a> Watch<'a> {
     fn held(&self, part: usize, history: &History) -> [Option<f64>; ZONES] {
         let model = &self.prepared.model;
         let axis = self.parts[part].frame.axis.as_dvec3().normalize_or_zero();
-        let mut places: Vec<(usize, DVec3, f64, f64)> = Vec::new();
+        let mut places: Vec<(usize, DVec3, &Steel, f64)> = Vec::new();
         for (steel, works) in model
             .steel
             .iter()
@@ -656,16 +665,16 @@ impl<'a> Watch<'a> {
             {
                 let middle = 0.5 * (piece.ends[0] + piece.ends[1]);
                 let zone = zone_at(self.parts[part].place(middle).0);
-                places.push((zone, middle - axis * middle.dot(axis), steel.area, work.stress));
+                places.push((zone, middle - axis * middle.dot(axis), steel, work.stress));
             }
         }
         let matter = |zone: usize| {
-            let (area, across, stress) = places
+            let (steel, across, stress) = places
                 .iter()
                 .filter(|p| p.0 == zone)
                 .map(|p| (p.2, p.1, p.3))
                 .max_by(|a, b| a.2.total_cmp(&b.2))?;
-            let diameter = (4.0 * area / std::f64::consts::PI).sqrt();
+            let diameter = steel.diameter();
             let apart = places
                 .iter()
                 .map(|p| p.1.distance(across))

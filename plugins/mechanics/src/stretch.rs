@@ -275,7 +275,7 @@ impl Renumbered {
         };
         if steel.bond.is_some() {
             return Err(format!(
-                "{} slips beyond the stretch: let its bond be perfect",
+                "{} slips beyond the stretch: let its bond be perfect, without laps",
                 steel.name
             ));
         }

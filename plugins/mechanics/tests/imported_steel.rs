@@ -35,13 +35,12 @@ fn beam(bars: &[(f32, f32, f32)]) -> Scene {
     let triangles = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
     let mesh = Mesh { positions: (0..8).map(corner).collect(), triangles, ..Mesh::default() };
     let mut scene = alone("B", MemberKind::Beam, mesh, 0.32);
-    let line = |(i, &(diameter, y, beyond)): (usize, &(f32, f32, f32))| SteelLine {
-        name: format!("bar {i}"),
-        part: Part::Bar,
-        diameter,
-        line: vec![Vec3::new(-2.0 - beyond, y, 0.03), Vec3::new(2.0 + beyond, y, 0.03)],
-        grade: Grade::named("B500B"),
-        prestress: None,
+    let line = |(i, &(diameter, y, beyond)): (usize, &(f32, f32, f32))| {
+        let ends = [-2.0 - beyond, 2.0 + beyond].map(|x| Vec3::new(x, y, 0.03)).to_vec();
+        SteelLine {
+            grade: Grade::named("B500B"),
+            ..SteelLine::new(format!("bar {i}"), Part::Bar, diameter, ends)
+        }
     };
     Arc::make_mut(&mut scene.structure).assemblies[0].steel =
         bars.iter().enumerate().map(line).collect();

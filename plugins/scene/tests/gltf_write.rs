@@ -12,7 +12,7 @@ use intrados_scene::{
     Camera, Frame, Lamp, LampKind, Material, Member, MemberKind, Mesh, Object, Part, Scene,
     SteelLine, Surface, Texture, TextureRef, Wrap, bundled,
     gltf::{self, ImportError, Model},
-    structure::Grade,
+    structure::{BarEnd, Bond, Grade},
 };
 use intrados_stage::Job;
 use serde_json::{Value, json};
@@ -188,6 +188,8 @@ fn lines_of_steel_and_frames_come_back() {
         diameter: 0.016,
         line: vec![Vec3::ZERO, Vec3::Y, Vec3::new(0.5, 1.25, 0.0)],
         grade: Grade::named("B500B").map(|g| g.at(Some(420.0))),
+        bond: Bond::Slip,
+        ends: [BarEnd::Straight, BarEnd::Hooked],
         prestress: None,
     };
     let frame = Frame { start: Vec3::X, axis: Vec3::new(1.5, 2.0, 0.0), zero: Vec3::Z };

@@ -6,7 +6,7 @@ use super::{Case, DeckError, locate, unfit};
 use crate::{
     element::{embed::embed, rod::Piece},
     mesh::{ElementId, Locator},
-    model::{Action, Matter, Steel, SteelKind, round},
+    model::{Action, Matter, Steel, SteelKind},
     read::Deck,
 };
 
@@ -65,7 +65,7 @@ impl Case {
                 name,
                 pieces,
                 area,
-                diameter: round(area),
+                count: 1.0,
                 kind: SteelKind::Stressed(steel, stress),
                 rust: None,
                 gone: Vec::new(),

@@ -10,15 +10,15 @@ use glam::DVec3;
 use intrados_stage::Job;
 
 use super::{
+    constraint::Sum,
     element::{Element, Folded, pairs},
+    free::Free,
     law::Table,
     model::{Cell, Deck, Heated, Heating, Step},
     modes::{self, Failed},
     solve::{LinearError, Solved},
 };
-use crate::sparse::{
-    BlockMatrix, Connectivity, Constraints, Method, Pattern, Place, SolveError, solve as direct,
-};
+use crate::sparse::{BlockMatrix, Constraints, Method, SolveError, solve as direct};
 
 /// Newton's steps; fewer than ten where nothing but radiation is nonlinear.
 const STEPS: usize = 200;
@@ -50,7 +50,7 @@ pub(super) fn solve(
     Ok(Solved {
         name: step.name.clone(),
         temperatures: temperatures[..deck.labels.len()].to_vec(),
-        unknowns: body.places.len(),
+        unknowns: body.free.count(),
         ..Solved::default()
     })
 }
@@ -70,7 +70,7 @@ pub(super) fn modes(
         Failed::Solve(error) => error.into(),
         _ => body.lost("eigenvalues"),
     })?;
-    let unknowns = body.places.len();
+    let unknowns = body.free.count();
     Ok(Solved { name: step.name.clone(), eigenvalues, unknowns, ..Solved::default() })
 }
 
@@ -78,53 +78,29 @@ pub(super) fn modes(
 struct Body<'a> {
     deck: &'a Deck,
     step: &'a Step,
-    /// Number of every node whose temperature is solved for.
-    numbers: HashMap<u32, u32>,
-    nodes: Vec<u32>,
-    places: Vec<Place>,
-    /// Numbers of every element.
-    elements: Connectivity,
+    /// The nodes whose temperature is solved for.
+    free: Free<'a>,
     loads: HashMap<u32, Vec<(Heated, [f64; 2])>>,
 }
 
 impl<'a> Body<'a> {
     fn new(deck: &'a Deck, step: &'a Step) -> Self {
-        let mut body = Self {
-            deck,
-            step,
-            numbers: HashMap::new(),
-            nodes: Vec::new(),
-            places: Vec::new(),
-            elements: Connectivity::default(),
-            loads: HashMap::new(),
+        let sum = |node: u32| {
+            // Flat elements have the temperature of their middle.
+            let owner = deck.twins.get(&node).copied().unwrap_or(node);
+            let is_held = step.temperatures.contains_key(&owner);
+            let terms = if is_held { Vec::new() } else { vec![(owner, 1.0)] };
+            // Newton's method asks for changes, which are none where it is held.
+            Sum { terms, constant: 0.0 }
         };
-        for cell in &deck.cells {
-            let mut free: Vec<u32> = cell.nodes.iter().map(|&n| body.owner(n)).collect();
-            free.retain(|n| !step.temperatures.contains_key(n));
-            free.sort_unstable();
-            free.dedup();
-            let numbered: Vec<u32> = free.into_iter().map(|n| body.number(n)).collect();
-            body.elements.push(&numbered);
-        }
+        let sums = (0..deck.nodes.len() as u32).map(sum).collect();
+        let elements = deck.cells.iter().map(|cell| cell.nodes.clone());
+        let free = Free::new(deck, sums, elements, |node| node);
+        let mut loads: HashMap<u32, Vec<(Heated, [f64; 2])>> = HashMap::new();
         for (&heated, &value) in step.heating.iter().filter(|(h, _)| h.0 != Heating::Node) {
-            body.loads.entry(heated.1).or_default().push((heated, value));
+            loads.entry(heated.1).or_default().push((heated, value));
         }
-        body
-    }
-
-    /// The node that a node has its temperature from.
-    fn owner(&self, node: u32) -> u32 {
-        self.deck.twins.get(&node).copied().unwrap_or(node)
-    }
-
-    fn number(&mut self, node: u32) -> u32 {
-        let next = self.places.len() as u32;
-        let number = *self.numbers.entry(node).or_insert(next);
-        if number == next {
-            self.places.push(Place::point(self.deck.nodes[node as usize].to_array()));
-            self.nodes.push(node);
-        }
-        number
+        Self { deck, step, free, loads }
     }
 
     fn lost(&self, what: &'static str) -> LinearError {
@@ -147,8 +123,10 @@ impl<'a> Body<'a> {
             for (&(_, node, _), value) in
                 self.step.heating.iter().filter(|(h, _)| h.0 == Heating::Node)
             {
-                if let Some(&number) = self.numbers.get(&self.owner(node)) {
-                    rhs[number as usize] += value[0];
+                for &(free, factor) in &self.free.sum(node).terms {
+                    if let Some(number) = self.free.number(free) {
+                        rhs[number] += factor * value[0];
+                    }
                 }
             }
             if rhs.is_empty() {
@@ -157,7 +135,7 @@ impl<'a> Body<'a> {
             let none = Constraints::new(rhs.len());
             let found = direct(&matrix, &rhs, &none, Method::Direct, 1e-7, job);
             let change = found.map_err(|error| self.explained(error))?.x;
-            self.nodes.iter().zip(&change).for_each(|(&n, d)| now[n as usize] += d);
+            self.free.order().iter().zip(&change).for_each(|(&n, d)| now[n as usize] += d);
             self.deck.spread(&mut now);
             let largest = |all: &[f64]| all.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
             if linear || largest(&change) <= SETTLED * largest(&now) {
@@ -237,29 +215,7 @@ impl<'a> Body<'a> {
         job: &Job,
         fill: impl Fn(usize, &mut [f64], &mut [f64]) -> Result<(), Folded> + Sync,
     ) -> Result<(BlockMatrix<1>, Vec<f64>), LinearError> {
-        let pattern = Pattern::new(self.places.clone(), &self.elements)?;
-        let mut matrix = BlockMatrix::<1>::zeros(pattern.into());
-        let mut rhs = vec![0.0; self.places.len()];
-        matrix.assemble_with(&self.elements, &mut rhs, job, |e, k, f| {
-            let cell = &self.deck.cells[e];
-            let n = cell.nodes.len();
-            let (mut full, mut flow) = (vec![0.0; n * n], vec![0.0; n]);
-            fill(e, &mut full, &mut flow).map_err(|Folded| LinearError::Folded(cell.label))?;
-            let members = self.elements.get(e);
-            let place = |n: &u32| {
-                let number = self.numbers.get(&self.owner(*n))?;
-                members.iter().position(|m| m == number)
-            };
-            let places: Vec<Option<usize>> = cell.nodes.iter().map(place).collect();
-            for (a, row) in places.iter().enumerate().filter_map(|(a, p)| Some((a, (*p)?))) {
-                f[row] += flow[a];
-                for (b, column) in places.iter().enumerate().filter_map(|(b, p)| Some((b, (*p)?))) {
-                    k[row * members.len() + column] += full[a * n + b];
-                }
-            }
-            Ok::<_, LinearError>(())
-        })?;
-        Ok((matrix, rhs))
+        self.free.assembled(job, |e| self.deck.cells[e].nodes.clone(), fill)
     }
 
     fn own(&self, e: usize, all: &[f64]) -> Vec<f64> {

@@ -21,6 +21,7 @@
 mod constraint;
 mod element;
 mod flat;
+mod free;
 mod gmsh;
 mod groups;
 mod heat;

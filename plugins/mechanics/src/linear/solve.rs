@@ -8,12 +8,13 @@ use intrados_stage::{Cancelled, Job};
 use super::{
     constraint::{Bound, Equation, Sum},
     element::{Element, Folded, Warmth},
+    free::Free,
     heat,
     model::{Deck, Procedure, Pull, Step},
     modes,
 };
 use crate::{
-    sparse::{BlockMatrix, Connectivity, Constraints, Method, Pattern, Place, SolveError, solve},
+    sparse::{BlockMatrix, Constraints, Method, SolveError, solve},
     tensor::{self, Voigt},
 };
 
@@ -180,13 +181,8 @@ struct System<'a> {
     step: &'a Step,
     /// Temperature of every node.
     warm: Vec<f64>,
-    /// Of every unknown of every node.
-    sums: Vec<Sum>,
-    /// Number of each free unknown among those that are solved for.
-    numbers: HashMap<u32, u32>,
-    places: Vec<Place>,
-    /// Free unknowns of every element, then of every spring.
-    elements: Connectivity,
+    /// What is solved for, by elements and after them by springs.
+    free: Free<'a>,
 }
 
 impl<'a> System<'a> {
@@ -198,49 +194,9 @@ impl<'a> System<'a> {
             .map_err(|e| LinearError::Contradiction { step: step.name.clone(), line: e.line })?;
         let sums: Vec<Sum> = (0..3 * deck.nodes.len() as u32).map(|u| bound.of(u)).collect();
         let warm = if step.warm.is_empty() { &past.temperatures } else { &step.warm };
-        let mut system = Self {
-            deck,
-            step,
-            warm: warm.clone(),
-            sums,
-            numbers: HashMap::new(),
-            places: Vec::new(),
-            elements: Connectivity::default(),
-        };
-        for e in 0..deck.cells.len() + deck.springs.len() {
-            let free = system.free(e);
-            let numbered: Vec<u32> = free.into_iter().map(|u| system.number(u)).collect();
-            system.elements.push(&numbered);
-        }
-        Ok(system)
-    }
-
-    /// Unknowns of an element or, after the elements, of a spring.
-    fn unknowns(&self, e: usize) -> Vec<u32> {
-        match self.deck.cells.get(e) {
-            Some(cell) => cell.nodes.iter().flat_map(|&n| (0..3).map(move |i| 3 * n + i)).collect(),
-            None => {
-                self.deck.springs[e - self.deck.cells.len()].terms.iter().map(|t| t.0).collect()
-            }
-        }
-    }
-
-    /// The free unknowns that an element moves with, ascending.
-    fn free(&self, e: usize) -> Vec<u32> {
-        let sums = self.unknowns(e).into_iter().map(|u| &self.sums[u as usize]);
-        let mut free: Vec<u32> = sums.flat_map(|s| s.terms.iter().map(|t| t.0)).collect();
-        free.sort_unstable();
-        free.dedup();
-        free
-    }
-
-    fn number(&mut self, free: u32) -> u32 {
-        let next = self.places.len() as u32;
-        let number = *self.numbers.entry(free).or_insert(next);
-        if number == next {
-            self.places.push(Place::point(self.deck.nodes[free as usize / 3].to_array()));
-        }
-        number
+        let elements = (0..deck.cells.len() + deck.springs.len()).map(|e| unknowns(deck, e));
+        let free = Free::new(deck, sums, elements, |unknown| unknown / 3);
+        Ok(Self { deck, step, warm: warm.clone(), free })
     }
 
     /// Temperatures of the nodes of an element.
@@ -283,49 +239,7 @@ impl<'a> System<'a> {
         job: &Job,
         fill: impl Fn(usize, &mut [f64], &mut [f64]) -> Result<(), Folded> + Sync,
     ) -> Result<(BlockMatrix<1>, Vec<f64>), LinearError> {
-        let pattern = Pattern::new(self.places.clone(), &self.elements)?;
-        let mut matrix = BlockMatrix::<1>::zeros(pattern.into());
-        let mut rhs = vec![0.0; self.places.len()];
-        matrix.assemble_with(&self.elements, &mut rhs, job, |e, k, f| {
-            let unknowns = self.unknowns(e);
-            let n = unknowns.len();
-            let (mut full, mut force) = (vec![0.0; n * n], vec![0.0; n]);
-            let label = || self.deck.cells.get(e).map_or(0, |c| c.label);
-            fill(e, &mut full, &mut force).map_err(|Folded| LinearError::Folded(label()))?;
-            self.reduced(self.elements.get(e), &unknowns, (&full, &force), k, f);
-            Ok::<_, LinearError>(())
-        })?;
-        Ok((matrix, rhs))
-    }
-
-    /// K and f of the unknowns of an element to those of what is free.
-    fn reduced(
-        &self,
-        members: &[u32],
-        unknowns: &[u32],
-        (full, force): (&[f64], &[f64]),
-        k: &mut [f64],
-        f: &mut [f64],
-    ) {
-        let n = unknowns.len();
-        let sums: Vec<&Sum> = unknowns.iter().map(|&u| &self.sums[u as usize]).collect();
-        // Places of every unknown's terms among those of the element.
-        let place = |free: &u32| {
-            let number = self.numbers.get(free)?;
-            members.iter().position(|m| m == number)
-        };
-        let share = |s: &&Sum| s.terms.iter().filter_map(|(u, c)| Some((place(u)?, *c))).collect();
-        let shares: Vec<Vec<(usize, f64)>> = sums.iter().map(share).collect();
-        for (i, share) in shares.iter().enumerate() {
-            let row = &full[i * n..(i + 1) * n];
-            let moved: f64 = row.iter().zip(&sums).map(|(k, s)| k * s.constant).sum();
-            for &(a, c) in share {
-                f[a] += c * (force[i] - moved);
-                for (value, other) in row.iter().zip(&shares) {
-                    other.iter().for_each(|&(b, d)| k[a * members.len() + b] += c * d * value);
-                }
-            }
-        }
+        self.free.assembled(job, |e| unknowns(self.deck, e), fill)
     }
 
     fn solve(self, past: &mut Past, job: &Job) -> Result<Solved, LinearError> {
@@ -352,7 +266,7 @@ impl<'a> System<'a> {
     fn moved(&self, job: &Job) -> Result<(Vec<f64>, Vec<Vec<Voigt>>, usize), LinearError> {
         let (matrix, mut rhs) = self.stiffness(job)?;
         self.nodal(&mut rhs)?;
-        let none = Constraints::new(self.places.len());
+        let none = Constraints::new(self.free.count());
         let solution = if rhs.is_empty() {
             Vec::new()
         } else {
@@ -363,7 +277,7 @@ impl<'a> System<'a> {
             }
             found.x
         };
-        let all = self.expanded(&solution);
+        let all = self.free.expanded(&solution);
         let stresses = self.stresses(&all)?;
         Ok((all, stresses, solution.len()))
     }
@@ -421,7 +335,7 @@ impl<'a> System<'a> {
                 LinearError::NotConverged { step: step.clone(), what: "eigenvalues" }
             }
         })?;
-        let unknowns = self.places.len();
+        let unknowns = self.free.count();
         Ok(Solved { name: step, eigenvalues, unknowns, ..Solved::default() })
     }
 
@@ -479,9 +393,9 @@ impl<'a> System<'a> {
         node: u32,
         rhs: &mut [f64],
     ) -> Result<(), LinearError> {
-        for (free, factor) in &self.sums[unknown as usize].terms {
-            match self.numbers.get(free) {
-                Some(&number) => rhs[number as usize] += factor * force,
+        for &(free, factor) in &self.free.sum(unknown).terms {
+            match self.free.number(free) {
+                Some(number) => rhs[number] += factor * force,
                 None if force == 0.0 => {}
                 None => {
                     let node = self.deck.labels.get(node as usize).copied().unwrap_or(0);
@@ -492,25 +406,23 @@ impl<'a> System<'a> {
         Ok(())
     }
 
-    /// Every unknown by what was solved for.
-    fn expanded(&self, solution: &[f64]) -> Vec<f64> {
-        let value = |sum: &Sum| {
-            let part = |(u, c): &(u32, f64)| {
-                self.numbers.get(u).map_or(0.0, |&n| c * solution[n as usize])
-            };
-            sum.constant + sum.terms.iter().map(part).sum::<f64>()
-        };
-        self.sums.iter().map(value).collect()
-    }
-
     /// Stresses of every element for these displacements.
     fn stresses(&self, all: &[f64]) -> Result<Vec<Vec<Voigt>>, LinearError> {
         let stress = |e: usize| {
-            let own: Vec<f64> = self.unknowns(e).into_iter().map(|u| all[u as usize]).collect();
+            let own: Vec<f64> =
+                unknowns(self.deck, e).into_iter().map(|u| all[u as usize]).collect();
             let found = self.element(e).stresses(&own, &self.warmth(e), self.initial(e));
             found.map_err(|Folded| LinearError::Folded(self.deck.cells[e].label))
         };
         (0..self.deck.cells.len()).map(stress).collect()
+    }
+}
+
+/// Unknowns of an element or, after the elements, of a spring.
+fn unknowns(deck: &Deck, e: usize) -> Vec<u32> {
+    match deck.cells.get(e) {
+        Some(cell) => cell.nodes.iter().flat_map(|&n| (0..3).map(move |i| 3 * n + i)).collect(),
+        None => deck.springs[e - deck.cells.len()].terms.iter().map(|t| t.0).collect(),
     }
 }
 

@@ -9,7 +9,7 @@ use crate::{
     element::embed::embed,
     material::steel::Bar,
     mesh::Locator,
-    model::{Matter, Plate, Steel, SteelKind, Tendon, round},
+    model::{Matter, Plate, Steel, SteelKind, Tendon},
 };
 
 /// Pressure under a plate at jacking, over the mean strength of the concrete then. EN 1992-1-1
@@ -162,7 +162,7 @@ impl Draft<'_> {
             name,
             pieces,
             area,
-            diameter: round(area),
+            count: 1.0,
             kind: SteelKind::Bar(bar),
             rust: None,
             gone: Vec::new(),

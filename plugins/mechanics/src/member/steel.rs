@@ -2,10 +2,10 @@
 
 use std::f64::consts::PI;
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use intrados_scene::{
     Part, SteelLine,
-    structure::{self, Hold, Place, Prestress, StrandGrade},
+    structure::{self, BarEnd, Hold, Place, Prestress, StrandGrade},
 };
 
 use super::{Draft, MemberError};
@@ -23,7 +23,7 @@ use crate::{
         steel::{Bar, Relaxation, Strand},
     },
     mesh::{HexFace, Locator, Mesh, voxel::distance::Triangles},
-    model::{Matter, Rust, Slipping, Steel, SteelKind, Tendon, round},
+    model::{Matter, Rust, Slipping, Steel, SteelKind, Tendon},
     prestress::{self, Jack, Path},
 };
 
@@ -73,6 +73,7 @@ impl Draft<'_> {
             kept += runs.iter().map(|run| length(run)).sum::<f64>();
             // A tendon that is cut is none: its anchorages are its ends.
             lines.extend(runs.into_iter().map(|run| SteelLine {
+                ends: ends_of(&run, line),
                 line: run.iter().map(|p| p.as_vec3()).collect(),
                 ..line.clone()
             }));
@@ -95,49 +96,66 @@ impl Draft<'_> {
         skin: Option<&Skin>,
         corners: impl Fn(usize) -> [DVec3; 8],
     ) -> Result<Steel, MemberError> {
-        let (id, name) = (self.id(), line.name.clone());
         // Round members are meshed by chords: what lies outside of them by less than a hair's
         // breadth is drawn in.
         let mut points: Vec<DVec3> = line.line.iter().map(|p| self.inward(p.as_dvec3())).collect();
         if line.part == Part::Bar && self.member.body.is_some() {
-            self.go_on(&mut points);
+            self.go_on(&mut points, line.ends);
         }
         let find = |p: DVec3| locator.locate(p).map(|host| (host.hex as usize, host.natural));
         let embedded = embed(&points, find, corners);
         let pieces = embedded.map_err(|source| MemberError::Embed {
-            id: id.clone(),
-            line: name.clone(),
+            id: self.id(),
+            line: line.name.clone(),
             source,
         })?;
-        let Some(stressing) = &line.prestress else {
-            let Some(grade) = line.grade else {
-                return Err(self.unsupported(format!("{name}: its steel has no grade known here")));
-            };
-            let bar = Bar::new(f64::from(grade.yield_mpa) * 1e6)
-                .map_err(|source| MemberError::Material { id, source })?;
-            let rupture = grade.ductility.map_or(f64::INFINITY, |[_, strain]| f64::from(strain));
-            let hardening = f64::from(grade.hardening_mpa()) * 1e6;
-            let bar = Bar { hardening, rupture, ..bar };
-            let diameter = f64::from(line.diameter);
-            let bond = self.bond(line, diameter);
-            let rust = skin.map(|skin| skin.rust(diameter, &pieces));
-            return Ok(Steel {
-                name,
-                pieces,
-                area: 0.25 * PI * diameter.powi(2),
-                diameter,
-                kind: SteelKind::Bar(bar),
-                rust,
-                gone: Vec::new(),
-                bond,
-                displaces: true,
-            });
-        };
-        let Some(grade) = StrandGrade::named(&stressing.steel) else {
-            return Err(self.unsupported(format!("{name}: its steel has no grade known here")));
-        };
+        match &line.prestress {
+            None => self.bar(line, pieces, skin),
+            Some(stressing) => self.tendon(line, stressing, &points, pieces),
+        }
+    }
+
+    fn bar(
+        &self,
+        line: &SteelLine,
+        pieces: Vec<Piece>,
+        skin: Option<&Skin>,
+    ) -> Result<Steel, MemberError> {
+        let grade = line.grade.ok_or_else(|| self.without_grade(line))?;
+        let bar = Bar::new(f64::from(grade.yield_mpa) * 1e6)
+            .map_err(|source| MemberError::Material { id: self.id(), source })?;
+        let rupture = grade.ductility.map_or(f64::INFINITY, |[_, strain]| f64::from(strain));
+        let hardening = f64::from(grade.hardening_mpa()) * 1e6;
+        let diameter = f64::from(line.diameter);
+        let rust = skin.map(|skin| skin.rust(diameter, &pieces));
+        Ok(Steel {
+            name: line.name.clone(),
+            pieces,
+            area: 0.25 * PI * diameter.powi(2),
+            count: 1.0,
+            kind: SteelKind::Bar(Bar { hardening, rupture, ..bar }),
+            rust,
+            gone: Vec::new(),
+            bond: self.bond(line, diameter),
+            displaces: true,
+        })
+    }
+
+    fn without_grade(&self, line: &SteelLine) -> MemberError {
+        self.unsupported(format!("{}: its steel has no grade known here", line.name))
+    }
+
+    fn tendon(
+        &self,
+        line: &SteelLine,
+        stressing: &Prestress,
+        points: &[DVec3],
+        pieces: Vec<Piece>,
+    ) -> Result<Steel, MemberError> {
+        let grade = StrandGrade::named(&stressing.steel).ok_or_else(|| self.without_grade(line))?;
         let tendon = jacked(stressing, grade);
-        let failed = |source| MemberError::Prestress { id: id.clone(), line: name.clone(), source };
+        let failed =
+            |source| MemberError::Prestress { id: self.id(), line: line.name.clone(), source };
         let path = Path::curve(&points.iter().map(|p| p.to_array()).collect::<Vec<_>>())
             .map_err(failed)?;
         let stations = tendon.stressed(&path).map_err(failed)?;
@@ -159,10 +177,10 @@ impl Draft<'_> {
         });
         // A tendon lies in its duct.
         Ok(Steel {
-            name,
+            name: line.name.clone(),
             pieces,
             area: tendon.area,
-            diameter: round(tendon.area),
+            count: 1.0,
             kind,
             rust: None,
             gone: Vec::new(),
@@ -171,19 +189,16 @@ impl Draft<'_> {
         })
     }
 
-    /// How a bar slips where the scene asks for it: good conditions, ribs .6 of a diameter apart,
-    /// its ends anchored.
+    /// How a bar slips where the scene asks for it: good conditions, ribs .6 of a diameter apart.
     fn bond(&self, line: &SteelLine, diameter: f64) -> Option<Slipping> {
-        let body = self.member.body.as_ref()?;
-        let slips = line.part == Part::Bar
-            && body.reinforcement().is_some_and(|r| r.bond == structure::Bond::Slip);
+        let slips = line.part == Part::Bar && line.bond == structure::Bond::Slip;
         let fcm = self.model.bodies.iter().find_map(|b| {
             if let Matter::Concrete(mix) = &b.matter { Some(mix.0.fcm) } else { None }
         })?;
         slips.then(|| Slipping {
             bond: Bond::good(fcm, 0.6 * diameter),
             perimeter: PI * diameter,
-            anchored: [true; 2],
+            anchored: line.ends.map(|end| end != BarEnd::Straight),
         })
     }
 
@@ -278,9 +293,9 @@ impl Draft<'_> {
         line.iter().zip(drawn).map(moved).collect()
     }
 
-    /// A bar that ends near a face which is held along the axis runs into that: into a footing that
-    /// it starts from, or into the other half of a symmetric member.
-    fn go_on(&self, points: &mut [DVec3]) {
+    /// A bar that ends near a face which is held along the axis, and not straight there, runs into
+    /// that: into a footing that it starts from, or into the other half of a symmetric member.
+    fn go_on(&self, points: &mut [DVec3], ends: [BarEnd; 2]) {
         let along = self.axes.unit[2];
         let held = |place: &Place| {
             let of_member =
@@ -301,9 +316,9 @@ impl Draft<'_> {
             if !held(&place) {
                 continue;
             }
-            let ends = [0, points.len() - 1];
-            for end in ends {
-                if let Some(point) = points.get_mut(end).filter(near) {
+            let last = points.len() - 1;
+            for (at, _) in [0, last].into_iter().zip(ends).filter(|(_, e)| *e != BarEnd::Straight) {
+                if let Some(point) = points.get_mut(at).filter(near) {
                     let mut local = self.axes.local(*point);
                     local.z = face.clamp(1e-6 * length, (1.0 - 1e-6) * length);
                     *point = self.axes.world(local);
@@ -324,6 +339,15 @@ impl Draft<'_> {
 /// A bar that ends within this distance of a held face runs into what holds it, m: covers are no
 /// deeper.
 const REACHES: f64 = 0.1;
+
+/// How the ends of a part of a line hold: where it was cut off, the bar goes on in a neighbour.
+fn ends_of(part: &[DVec3], whole: &SteelLine) -> [BarEnd; 2] {
+    let is_own = |at: Option<&DVec3>, end: Option<&Vec3>| {
+        at.zip(end).is_some_and(|(at, end)| at.distance(end.as_dvec3()) < SHORTEST)
+    };
+    let own = [is_own(part.first(), whole.line.first()), is_own(part.last(), whole.line.last())];
+    std::array::from_fn(|i| if own[i] { whole.ends[i] } else { BarEnd::Anchored })
+}
 
 fn length(line: &[DVec3]) -> f64 {
     line.windows(2).map(|w| w[0].distance(w[1])).sum()

@@ -28,7 +28,7 @@ pub use law::{Elastic, Matter, Memory, Record};
 pub use linear::Linear;
 pub use march::{Control, Drive, Failure, March, MarchSettings, Step};
 pub use nonlocal::Regularisation;
-pub(crate) use steel::{JACKING, round};
+pub(crate) use steel::JACKING;
 pub use steel::{Piecework, Rust, Slipping, Steel, SteelKind, Tendon};
 pub(crate) use structure::Trial;
 pub use structure::{Point, System};

@@ -19,8 +19,9 @@ pub struct Steel {
     pub pieces: Vec<Piece>,
     /// Cross-section, m².
     pub area: f64,
-    /// Of each of the bars that it stands for, m.
-    pub diameter: f64,
+    /// How many bars it stands for, which share its section and lie too near each other to be told
+    /// apart.
+    pub count: f64,
     /// What it is.
     pub kind: SteelKind,
     /// What takes its section; none: nothing.
@@ -115,15 +116,16 @@ pub struct Piecework {
     pub bond: [BondState; 2],
 }
 
-/// Diameter of a bar with this section (m²), m.
-pub(crate) fn round(area: f64) -> f64 {
-    (4.0 * area / std::f64::consts::PI).sqrt()
-}
-
 /// How long jacking takes, s.
 pub(crate) const JACKING: f64 = 21_600.0;
 
 impl Steel {
+    /// Diameter of one of its bars, m.
+    #[must_use]
+    pub fn diameter(&self) -> f64 {
+        (4.0 * self.area / (std::f64::consts::PI * self.count)).sqrt()
+    }
+
     /// What its pieces remember before anything has happened.
     pub(super) fn rest(&self) -> Vec<Piecework> {
         let initial = |piece: usize| match &self.kind {
@@ -259,7 +261,7 @@ mod tests {
             name: "bar".into(),
             pieces,
             area: 5e-5,
-            diameter: 8e-3,
+            count: 1.0,
             kind,
             rust: Some(rust),
             gone: Vec::new(),

@@ -130,7 +130,7 @@ pub(super) fn column(job: &Job) -> Checks {
         name: "bars".into(),
         pieces,
         area: steel_area,
-        diameter: 0.02,
+        count: 12.0,
         kind: SteelKind::Bar(Bar::new(500e6)?),
         rust: None,
         gone: Vec::new(),

@@ -420,11 +420,10 @@ impl List<'_> {
 
     fn bars(&mut self, bars: &Bars, path: &[Step], number: usize, of: usize) {
         let place = |field| at(path, &[Named(field)]);
-        let (what, count, diameter) = match bars {
-            Bars::Around { count, diameter_mm } => ("around".to_owned(), *count, *diameter_mm),
-            Bars::Row { side_deg, count, diameter_mm, .. } => {
-                (format!("at {side_deg}°"), *count, *diameter_mm)
-            }
+        let (count, diameter) = bars.size();
+        let what = match bars {
+            Bars::Around { .. } => "around".to_owned(),
+            Bars::Row { side_deg, .. } => format!("at {side_deg}°"),
         };
         let layer = if of > 1 { format!(", layer {}", number + 1) } else { String::new() };
         self.count(&format!("bars {what}{layer}"), Some(count), place("count"));

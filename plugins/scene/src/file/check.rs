@@ -18,6 +18,8 @@ const MAX_PARTS: f32 = 20_000.0;
 
 /// How many bars, stirrups, tendons and segments a scene may have in all.
 const MAX_ALL_PARTS: f32 = 500_000.0;
+/// How many laps a bar may have: rods of 12 m along the longest member that a scene may have.
+const MAX_LAPS: usize = 200;
 /// How many shapes a scene may have.
 const MAX_SHAPES: usize = 200_000;
 /// How many entries a section may have: meters and gauges are looked for on their members one by
@@ -55,7 +57,7 @@ pub fn check(scene: &SceneFile) -> Vec<Problem> {
             c.at("body", |c| c.body(body));
         }
         // How large and how long it is, only its model knows.
-        c.reinforcement(detail.reinforcement.as_ref(), f32::MAX, 1.0, false);
+        c.reinforcement(detail.reinforcement.as_ref(), f32::MAX, None, false);
         c.condition(detail.exposure.as_ref(), &detail.slices, &detail.truth);
     });
     c.at("project", |c| c.project(&scene.project));
@@ -218,9 +220,7 @@ impl Body {
             s.as_ref().map_or(0.0, |s| 1000.0 * length / s.spacing_mm.max(10.0))
         };
         let of_bar = |r: &Option<Reinforcement>, length: f32| {
-            let count = |b: &Bars| match *b {
-                Bars::Around { count, .. } | Bars::Row { count, .. } => count as f32,
-            };
+            let count = |b: &Bars| b.size().0 as f32 * (b.laps().len() + 1) as f32;
             r.as_ref().map_or(0.0, |r| {
                 r.bars.iter().map(count).sum::<f32>() + stirrups(&r.stirrups, length)
             })
@@ -673,7 +673,7 @@ impl Checker<'_> {
                 self.reinforcement(
                     reinforcement.as_ref(),
                     least,
-                    *height_m,
+                    Some(*height_m),
                     matches!(section, Section::Round { .. }),
                 );
             }
@@ -683,7 +683,7 @@ impl Checker<'_> {
                 self.reinforcement(
                     reinforcement.as_ref(),
                     least,
-                    *length_m,
+                    Some(*length_m),
                     matches!(section, Section::Round { .. }),
                 );
                 let half = match *section {
@@ -698,7 +698,7 @@ impl Checker<'_> {
                 self.reinforcement(
                     reinforcement.as_ref(),
                     s.top_m.min(s.bottom_m).min(s.web_m),
-                    *length_m,
+                    Some(*length_m),
                     false,
                 );
                 self.tendons(tendons, [s.depth_m / 2.0, s.top_width_m / 2.0]);
@@ -788,11 +788,12 @@ impl Checker<'_> {
         }
     }
 
+    /// `least_m`: the smallest measure of its section; `length_m`: of its axis, where it is known.
     fn reinforcement(
         &mut self,
         r: Option<&Reinforcement>,
         least_m: f32,
-        length_m: f32,
+        length_m: Option<f32>,
         round: bool,
     ) {
         let Some(r) = r else { return };
@@ -801,38 +802,61 @@ impl Checker<'_> {
             c.grade(&r.steel, r.f_y_mpa);
             let mut thickest = 0.0_f32;
             c.each("bars", &r.bars, |c, bars| {
-                let diameter = match *bars {
-                    Bars::Around { count, diameter_mm } => {
+                let (diameter, [from, to]) = (bars.size().1, bars.span());
+                if !(0.0 <= from && from < to && to <= 1.0) {
+                    c.error("from", "RANGE", "bars run from a place to a later one, both from 0 to 1");
+                }
+                c.laps(bars, length_m);
+                match *bars {
+                    Bars::Around { count, .. } => {
                         c.count("count", count, 3, 1000);
                         if !round && count < 4 {
                             c.error("count", "RANGE", "a section with corners needs at least 4 bars around");
                         }
-                        diameter_mm
                     }
-                    Bars::Row { side_deg, count, diameter_mm, inset_mm, from, to, f_y_mpa } => {
+                    Bars::Row { side_deg, count, inset_mm, f_y_mpa, .. } => {
                         c.count("count", count, 1, 1000);
                         c.within("inset_mm", inset_mm, 0.0, 500.0 * least_m);
                         c.grade(&r.steel, f_y_mpa);
-                        if !(0.0 <= from && from < to && to <= 1.0) {
-                            c.error("from", "RANGE", "bars run from a place to a later one, both from 0 to 1");
-                        }
                         if ![0.0, 90.0, 180.0, 270.0].contains(&side_deg) || round {
                             c.error("side_deg", "RANGE", "a row lies at side 0, 90, 180 or 270 of a section with corners");
                         }
-                        diameter_mm
                     }
-                };
+                }
                 c.within("diameter_mm", diameter, 1.0, 100.0);
                 thickest = thickest.max(diameter);
             });
             let mut stirrup = 0.0;
             if let Some(s) = &r.stirrups {
-                c.at("stirrups", |c| c.stirrups(s, length_m));
+                c.at("stirrups", |c| c.stirrups(s, length_m.unwrap_or(1.0)));
                 stirrup = s.diameter_mm;
             }
             if 2.0 * (r.cover_mm + stirrup + thickest) > 1000.0 * least_m {
                 c.error("cover_mm", "RANGE", "cover, stirrups and bars do not fit into the section: make one of them smaller");
             }
+        });
+    }
+
+    /// Laps in their order along the axis, each within its bars and clear of the next.
+    fn laps(&mut self, bars: &Bars, length_m: Option<f32>) {
+        let ([from, to], laps) = (bars.span(), bars.laps());
+        if laps.len() > MAX_LAPS {
+            self.error("laps", "TOO_MANY", format!("at most {MAX_LAPS}: {} are given", laps.len()));
+            return;
+        }
+        let mut free = from;
+        self.each("laps", laps, |c, lap| {
+            let known = c.within("at", lap.at, 0.0, 1.0)
+                & c.within("length_mm", lap.length_mm, 10.0, 10_000.0);
+            // Of what came with a model, only that knows how long it is.
+            let [start, end] = length_m.map_or([lap.at; 2], |length| lap.span(length));
+            if known && !(start > free && end < to) {
+                let message = format!(
+                    "the lap reaches from {start:.3} to {end:.3} of the axis, and must begin beyond {free:.3} and end before {to:.3}: move or shorten it, laps in their order along the axis"
+                );
+                c.error("at", "RANGE", message);
+            }
+            free = end;
         });
     }
 

@@ -1,5 +1,7 @@
 //! What can be computed as it is written, and is probably not meant.
 
+mod bars;
+
 use std::f32::consts::TAU;
 
 use super::*;
@@ -29,6 +31,8 @@ pub(crate) fn doubts(scene: &SceneFile) -> Vec<String> {
             ));
         }
     }
+    doubts.extend(scene.members.iter().flat_map(|m| bars::short_laps(m, fck(scene, m))));
+    doubts.extend(scene.members.iter().filter_map(bars::unused_ends));
     doubts.extend(scene.members.iter().filter_map(no_class));
     doubts.extend(scene.members.iter().filter_map(|member| unheld(scene, member)));
     for load in &scene.loads {
@@ -117,9 +121,14 @@ fn times(scene: &SceneFile, member: &Member, action: &Action) -> Option<f32> {
 
 /// Mean strength of a member's concrete, f_ck + 8 MPa (EN 1992-1-1, table 3.1), MPa.
 fn strength(scene: &SceneFile, member: &Member) -> f32 {
+    8.0 + fck(scene, member)
+}
+
+/// Characteristic strength of a member's concrete, MPa.
+fn fck(scene: &SceneFile, member: &Member) -> f32 {
     let name = member.concrete.as_deref().unwrap_or(ASSUMED_CONCRETE);
     let own = scene.concretes.iter().find(|c| c.name == name).map(|c| c.fck_mpa);
-    8.0 + own.or_else(|| concrete_class(name)).unwrap_or(30.0)
+    own.or_else(|| concrete_class(name)).unwrap_or(30.0)
 }
 
 #[cfg(test)]

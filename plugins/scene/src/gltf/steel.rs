@@ -7,7 +7,7 @@ use serde_json::{Map, Value, json};
 use super::json::Json;
 use crate::{
     Frame, Part, SteelLine,
-    structure::{Grade, Prestress},
+    structure::{Bond, Grade, Prestress},
 };
 
 /// Points that one line may have.
@@ -22,6 +22,10 @@ pub(super) fn said(line: &SteelLine) -> Value {
     if let Some(grade) = line.grade {
         said.insert("grade".into(), grade.name.into());
         said.insert("f_y_mpa".into(), grade.yield_mpa.into());
+    }
+    if line.bond == Bond::Slip {
+        said.insert("bond".into(), json!(line.bond));
+        said.insert("ends".into(), json!(line.ends));
     }
     if let Some(prestress) = &line.prestress {
         said.insert("prestress".into(), serde_json::to_value(prestress).unwrap_or_default());
@@ -48,6 +52,8 @@ pub(super) fn read(said: &Value, part: Part) -> Option<SteelLine> {
         diameter,
         line,
         grade,
+        bond: serde_json::from_value(said.field("bond").clone()).unwrap_or_default(),
+        ends: serde_json::from_value(said.field("ends").clone()).unwrap_or_default(),
         prestress,
     })
 }

@@ -6,7 +6,7 @@ use crate::{
     Frame, MemberKind, Part,
     file::Assumed,
     parametric,
-    structure::{ASSUMED_CONCRETE, Bars, Grade, Reinforcement, Stirrups},
+    structure::{ASSUMED_CONCRETE, Bars, Grade, Reinforcement, Stirrups, fctm},
 };
 
 /// Steel of bars where nothing is said of it.
@@ -84,11 +84,6 @@ fn bars(area: f64, width: f64, most: f64, least: f64) -> (u32, f32) {
     (found.0.min(1000.0) as u32, found.1 as f32)
 }
 
-/// Mean tensile strength of EN 1992-1-1, table 3.1, MPa.
-fn fctm(fck: f64) -> f64 {
-    if fck <= 50.0 { 0.3 * fck.powf(2.0 / 3.0) } else { 2.12 * (1.0 + (fck + 8.0) / 10.0).ln() }
-}
-
 /// The least reinforcement of EN 1992-1-1 for a member, none of one that has no room for it.
 ///
 /// - columns (§9.5.2): .002 A_c, a bar in each corner, at most 400 mm apart; links of §9.5.3
@@ -142,10 +137,7 @@ type Laid = (Vec<Bars>, (f32, f32));
 fn around(area: f64, fewest: u32, least: f64, way: f64) -> Laid {
     let (count, diameter_mm) = bars(area, way, 0.4, least);
     let link = (0.25 * diameter_mm).max(6.0);
-    (
-        vec![Bars::Around { count: count.max(fewest), diameter_mm }],
-        (link, (20.0 * diameter_mm).min(400.0)),
-    )
+    (vec![Bars::around(count.max(fewest), diameter_mm)], (link, (20.0 * diameter_mm).min(400.0)))
 }
 
 fn wall(m: &Measures, cover: f64) -> Laid {
@@ -236,8 +228,7 @@ mod tests {
     }
 
     fn area(bars: &Bars) -> f64 {
-        let (Bars::Around { count, diameter_mm } | Bars::Row { count, diameter_mm, .. }) = *bars;
-        f64::from(count) * std::f64::consts::FRAC_PI_4 * f64::from(diameter_mm).powi(2) * 1e-6
+        f64::from(bars.area())
     }
 
     #[test]

@@ -495,13 +495,12 @@ impl Builder {
             self.built.steel.assumed += 1;
         }
         let is_tendon = part == Part::Tendon;
+        let diameter = nominal.filter(|_| !is_tendon).unwrap_or(course.diameter) as f32;
+        let line = course.line.iter().map(|p| p.as_vec3()).collect();
         SteelLine {
-            name,
-            part,
-            diameter: nominal.filter(|_| !is_tendon).unwrap_or(course.diameter) as f32,
-            line: course.line.iter().map(|p| p.as_vec3()).collect(),
             grade: grade.filter(|_| !is_tendon),
             prestress: is_tendon.then(|| prestress(element, course)),
+            ..SteelLine::new(name, part, diameter, line)
         }
     }
 }

@@ -387,7 +387,7 @@ fn reinforcement(r: &Reinforcement) -> String {
         .bars
         .iter()
         .map(|b| match b {
-            Bars::Around { count, diameter_mm } => {
+            Bars::Around { count, diameter_mm, .. } => {
                 format!("Around(count: {count}, diameter_mm: {diameter_mm})")
             }
             Bars::Row { side_deg, count, diameter_mm, .. } => {

@@ -82,33 +82,33 @@ fn prism(
         let (cover, grade) = ((r.cover_mm / 1000.0).min(0.4 * length), r.grade());
         let of =
             |f_y_mpa: Option<f32>| grade.map(|g| if f_y_mpa.is_some() { g.at(f_y_mpa) } else { g });
-        lines.extend(bars(outline, r).into_iter().enumerate().map(|(i, bar)| SteelLine {
-            name: format!("bar {}", i + 1),
-            part: Part::Bar,
-            diameter: bar.diameter,
-            line: bar.ends(length, cover).map(|z| bar.at.extend(z)).to_vec(),
-            grade: of(bar.f_y_mpa),
-            prestress: None,
+        lines.extend(bars(outline, r, length).into_iter().enumerate().map(|(i, bar)| {
+            let line = bar.reach(length, cover).map(|z| bar.at.extend(z)).to_vec();
+            SteelLine {
+                grade: of(bar.f_y_mpa),
+                bond: bar.bond,
+                ends: bar.ends,
+                ..SteelLine::new(format!("bar {}", i + 1), Part::Bar, bar.diameter, line)
+            }
         }));
         if let Some(s) = &r.stirrups {
             let shape = closed(stirrup(outline, r.cover_mm / 1000.0, s.diameter_mm / 1000.0));
-            lines.extend(stirrup_places(s, length, cover).enumerate().map(|(i, z)| SteelLine {
-                name: format!("stirrup {}", i + 1),
-                part: Part::Stirrup,
-                diameter: s.diameter_mm / 1000.0,
-                line: shape.iter().map(|p| *p + Vec3::Z * z).collect(),
-                grade: of(s.f_y_mpa),
-                prestress: None,
+            let diameter = s.diameter_mm / 1000.0;
+            lines.extend(stirrup_places(s, length, cover).enumerate().map(|(i, z)| {
+                let line = shape.iter().map(|p| *p + Vec3::Z * z).collect();
+                SteelLine {
+                    grade: of(s.f_y_mpa),
+                    ..SteelLine::new(format!("stirrup {}", i + 1), Part::Stirrup, diameter, line)
+                }
             }));
         }
     }
-    lines.extend(tendons.iter().map(|t| SteelLine {
-        name: t.name.clone(),
-        part: Part::Tendon,
-        diameter: t.duct_mm / 1000.0,
-        line: tendon_line(&t.line, length, 0.0),
-        grade: None,
-        prestress: Some(t.prestress.clone()),
+    lines.extend(tendons.iter().map(|t| {
+        let line = tendon_line(&t.line, length, 0.0);
+        SteelLine {
+            prestress: Some(t.prestress.clone()),
+            ..SteelLine::new(t.name.clone(), Part::Tendon, t.duct_mm / 1000.0, line)
+        }
     }));
     lines
 }
@@ -126,13 +126,10 @@ fn lining(body: &Body) -> Vec<SteelLine> {
         if let Some(h) = &l.hoops {
             let shape = arc(face + sign * (cover + 0.5 * hoop), 0.0, TAU, 0.0);
             lines.extend(stirrup_places(h, length, cover.min(0.4 * length)).enumerate().map(
-                |(i, z)| SteelLine {
-                    name: format!("{side} hoop {}", i + 1),
-                    part: Part::Stirrup,
-                    diameter: hoop,
-                    line: shape.iter().map(|p| *p + Vec3::Z * z).collect(),
-                    grade,
-                    prestress: None,
+                |(i, z)| {
+                    let line = shape.iter().map(|p| *p + Vec3::Z * z).collect();
+                    let name = format!("{side} hoop {}", i + 1);
+                    SteelLine { grade, ..SteelLine::new(name, Part::Stirrup, hoop, line) }
                 },
             ));
         }
@@ -142,14 +139,9 @@ fn lining(body: &Body) -> Vec<SteelLine> {
             let r = face + sign * (cover + hoop + 0.5 * diameter);
             lines.extend((0..b.count).map(|i| {
                 let p = r * Vec2::from_angle(TAU * i as f32 / b.count as f32);
-                SteelLine {
-                    name: format!("{side} bar {}", i + 1),
-                    part: Part::Bar,
-                    diameter,
-                    line: vec![p.extend(end), p.extend(length - end)],
-                    grade,
-                    prestress: None,
-                }
+                let (name, line) =
+                    (format!("{side} bar {}", i + 1), vec![p.extend(end), p.extend(length - end)]);
+                SteelLine { grade, ..SteelLine::new(name, Part::Bar, diameter, line) }
             }));
         }
     }
@@ -162,16 +154,12 @@ fn lining(body: &Body) -> Vec<SteelLine> {
                     .copied()
                     .unwrap_or(0.0)
                     .to_radians();
+                let turn = arc(radius + t.depth_m, anchor, anchor + TAU, 0.0);
+                let line = turn.into_iter().map(|p| p + Vec3::Z * z).collect();
+                let (name, duct) = (format!("tendon {}", i + 1), t.duct_mm / 1000.0);
                 SteelLine {
-                    name: format!("tendon {}", i + 1),
-                    part: Part::Tendon,
-                    diameter: t.duct_mm / 1000.0,
-                    line: arc(radius + t.depth_m, anchor, anchor + TAU, 0.0)
-                        .into_iter()
-                        .map(|p| p + Vec3::Z * z)
-                        .collect(),
-                    grade: None,
                     prestress: Some(t.prestress.clone()),
+                    ..SteelLine::new(name, Part::Tendon, duct, line)
                 }
             },
         ));

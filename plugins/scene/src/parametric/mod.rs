@@ -298,8 +298,8 @@ impl Builder<'_> {
             self.job.step(0, 1)?;
             let cover = (r.cover_mm / 1000.0).min(0.4 * length);
             let mut last: Option<(f32, [f32; 2], usize)> = None;
-            for (i, bar) in steel::bars(outline, r).into_iter().enumerate() {
-                let (diameter, ends) = (bar.diameter, bar.ends(length, cover));
+            for (i, bar) in steel::bars(outline, r, length).into_iter().enumerate() {
+                let (diameter, ends) = (bar.diameter, bar.reach(length, cover));
                 // Bars of one diameter and length share a mesh.
                 let mesh = match last {
                     Some((d, e, mesh)) if d == diameter && e == ends => mesh,

@@ -5,7 +5,7 @@ use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
 use glam::{Vec2, Vec3};
 
-use crate::structure::{Bars, Reinforcement, Stirrups};
+use crate::structure::{BarEnd, Bars, Bond, Reinforcement, Stirrups};
 
 /// The outline that steel keeps its cover from.
 #[derive(Debug, Clone, Copy)]
@@ -27,36 +27,39 @@ pub(crate) struct Laid {
     pub(crate) diameter: f32,
     /// From where to where on the axis, 0 to 1.
     pub(crate) span: [f32; 2],
+    /// How it holds to the concrete.
+    pub(crate) bond: Bond,
+    /// How its ends hold.
+    pub(crate) ends: [BarEnd; 2],
     /// Yield stress where it is another than that of the rest, MPa.
     pub(crate) f_y_mpa: Option<f32>,
 }
 
 impl Laid {
     /// Where it begins and ends along an axis of `length`, `cover` away from both faces, m.
-    pub(crate) fn ends(&self, length: f32, cover: f32) -> [f32; 2] {
+    pub(crate) fn reach(&self, length: f32, cover: f32) -> [f32; 2] {
         self.span.map(|share| (share * length).clamp(cover, length - cover))
     }
 }
 
-/// The longitudinal bars.
-pub(crate) fn bars(outline: Outline, r: &Reinforcement) -> Vec<Laid> {
+/// The longitudinal bars along an axis of `length`, m: of lapped ones every piece, beside the one
+/// before it.
+pub(crate) fn bars(outline: Outline, r: &Reinforcement, length: f32) -> Vec<Laid> {
     let stirrup = r.stirrups.as_ref().map_or(0.0, |s| s.diameter_mm);
     let mut list = Vec::new();
     for bars in &r.bars {
-        let (Bars::Around { count, diameter_mm } | Bars::Row { count, diameter_mm, .. }) = *bars;
+        let (count, diameter_mm) = bars.size();
         let first = (r.cover_mm + stirrup + 0.5 * diameter_mm) / 1000.0;
-        let (inset, span, f_y_mpa) = match *bars {
-            Bars::Row { inset_mm, from, to, f_y_mpa, .. } => {
-                (first + inset_mm / 1000.0, [from, to], f_y_mpa)
-            }
-            Bars::Around { .. } => (first, [0.0, 1.0], None),
+        let (inset, f_y_mpa) = match *bars {
+            Bars::Row { inset_mm, f_y_mpa, .. } => (first + inset_mm / 1000.0, f_y_mpa),
+            Bars::Around { .. } => (first, None),
         };
         // Farther in, but as wide as the first layer.
         let inner = |half: Vec2, side_deg: f32| match side_deg as i32 {
             0 | 180 => half - Vec2::new(inset, first),
             _ => half - Vec2::new(first, inset),
         };
-        let places = match (bars, outline) {
+        let places: Vec<Vec2> = match (bars, outline) {
             (Bars::Around { .. }, Outline::Round(radius))
             | (Bars::Row { .. }, Outline::Round(radius)) => (0..count)
                 .map(|i| (radius - inset) * Vec2::from_angle(TAU * i as f32 / count as f32))
@@ -74,9 +77,47 @@ pub(crate) fn bars(outline: Outline, r: &Reinforcement) -> Vec<Laid> {
             }
         };
         let diameter = diameter_mm / 1000.0;
-        list.extend(places.into_iter().map(|at| Laid { at, diameter, span, f_y_mpa }));
+        let bond = if bars.laps().is_empty() { r.bond } else { Bond::Slip };
+        for (i, (span, ends)) in pieces(bars, length).into_iter().enumerate() {
+            let place = |at: &Vec2| if i % 2 == 1 { beside(outline, *at, diameter) } else { *at };
+            let laid = |at| Laid { at, diameter, span, bond, ends, f_y_mpa };
+            list.extend(places.iter().map(place).map(laid));
+        }
     }
     list
+}
+
+/// The bars that each of these is made of, between its laps: from where to where, 0 to 1, and how
+/// their ends hold.
+fn pieces(bars: &Bars, length: f32) -> Vec<([f32; 2], [BarEnd; 2])> {
+    let ([from, to], [first, last]) = (bars.span(), bars.ends());
+    let (mut begin, mut pieces) = ((from, first), Vec::new());
+    for lap in bars.laps() {
+        let [start, end] = lap.span(length).map(|at| at.clamp(from, to));
+        pieces.push(([begin.0, end], [begin.1, BarEnd::Straight]));
+        begin = (start, BarEnd::Straight);
+    }
+    pieces.push(([begin.0, to], [begin.1, last]));
+    pieces
+}
+
+/// The place of a bar that touches the one at a place: along the face that this lies at, towards
+/// its middle.
+fn beside(outline: Outline, at: Vec2, diameter: f32) -> Vec2 {
+    let half = match outline {
+        Outline::Round(_) => {
+            return Vec2::from_angle(diameter / at.length().max(diameter)).rotate(at);
+        }
+        Outline::Rectangle(half) => half,
+        Outline::Girder { bottom, depth, .. } => Vec2::new(depth, bottom),
+    };
+    let towards_middle = |x: f32| if x > 0.0 { x - diameter } else { x + diameter };
+    let off = half - at.abs();
+    if off.x <= off.y {
+        Vec2::new(at.x, towards_middle(at.y))
+    } else {
+        Vec2::new(towards_middle(at.x), at.y)
+    }
 }
 
 /// A bar in every corner, the others spread over the sides by their lengths.
@@ -217,6 +258,7 @@ pub(crate) fn arc(radius: f32, from: f32, to: f32, z: f32) -> Vec<Vec3> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::structure::Lap;
 
     #[test]
     fn bars_around_a_rectangle_are_as_many_as_asked_and_in_all_corners() {
@@ -229,6 +271,53 @@ mod tests {
             for p in &list {
                 assert!((p.x.abs() - 0.2).abs() < 1e-6 || (p.y.abs() - 0.3).abs() < 1e-6);
             }
+        }
+    }
+
+    /// Two laps of 600 mm make three bars of one of 6 m: each overlaps the next by a lap, beside
+    /// it, and only the ends that lie in no lap hold as those of the whole do.
+    #[test]
+    fn a_lapped_bar_is_several_that_overlap() {
+        let lap = |at| Lap { at, length_mm: 600.0 };
+        let bars = |laps| Bars::Around {
+            count: 4,
+            diameter_mm: 20.0,
+            from: 0.0,
+            to: 1.0,
+            ends: [BarEnd::Anchored, BarEnd::Hooked],
+            laps,
+        };
+        let of = |laps| Reinforcement {
+            cover_mm: 40.0,
+            steel: "B500B".into(),
+            f_y_mpa: None,
+            bars: vec![bars(laps)],
+            stirrups: None,
+            bond: Bond::Perfect,
+        };
+        let outline = Outline::Rectangle(Vec2::new(0.2, 0.3));
+        let whole = super::bars(outline, &of(Vec::new()), 6.0);
+        assert!(whole.iter().all(|bar| bar.bond == Bond::Perfect && bar.span == [0.0, 1.0]));
+        let list = super::bars(outline, &of(vec![lap(0.3), lap(0.8)]), 6.0);
+        assert_eq!(list.len(), 3 * whole.len());
+        let straight = BarEnd::Straight;
+        let wanted = [
+            ([0.0, 2.1], [BarEnd::Anchored, straight]),
+            ([1.5, 5.1], [straight; 2]),
+            ([4.5, 5.96], [straight, BarEnd::Hooked]),
+        ];
+        for (pieces, (reach, ends)) in list.chunks(whole.len()).zip(wanted) {
+            for piece in pieces {
+                let found = piece.reach(6.0, 0.04);
+                assert!((found[1] - reach[1]).abs() < 1e-5, "{piece:?}");
+                assert!((found[0] - reach[0].max(0.04)).abs() < 1e-5, "{piece:?}");
+                assert!(piece.bond == Bond::Slip && piece.ends == ends, "{piece:?}");
+            }
+        }
+        for (one, next) in list.iter().zip(&list[whole.len()..]) {
+            let (at, other) = (one.at.abs(), next.at.abs());
+            assert!((one.at.distance(next.at) - 0.02).abs() < 1e-6, "{one:?} {next:?}");
+            assert!(at.max(other).cmple(Vec2::new(0.15, 0.25) + 1e-6).all(), "{one:?} {next:?}");
         }
     }
 

@@ -133,12 +133,27 @@ pub struct Reinforcement {
 /// Bond of bars.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub enum Bond {
-    /// They move with the concrete around them.
+    /// They move with the concrete around them; but lapped ones slip.
     #[default]
     Perfect,
-    /// They slip by the law of the CEB (fib Model Code 2010 §6.1.1, good conditions), anchored at
-    /// their ends.
+    /// They slip by the law of the CEB (fib Model Code 2010 §6.1.1, good conditions), but where
+    /// their ends are anchored.
     Slip,
+}
+
+/// How an end of a bar holds, where bars slip.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub enum BarEnd {
+    /// By a plate, or beyond what is computed: it does not slip. At a face that is held along the
+    /// axis it goes on into what holds that.
+    #[default]
+    Anchored,
+    /// By a bend, a hook or a loop (EN 1992-1-1, 8.4.1): it does not slip either. The tenths of a
+    /// millimetre by which a hook gives way are left out, and in compression, where 8.4.1 (3) counts
+    /// no hook, the concrete before it holds as well.
+    Hooked,
+    /// By bond alone: it slips.
+    Straight,
 }
 
 impl Body {
@@ -158,6 +173,27 @@ fn b500() -> String {
     "B500B".into()
 }
 
+/// A lap: over its length two bars lie side by side, and hand on their force by bond alone. Their
+/// ends in it are straight, and lapped bars slip whatever `bond` says, since with perfect bond the
+/// shortest lap would do.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Lap {
+    /// Its middle on the axis, 0 to 1.
+    pub at: f32,
+    /// From the end of one bar to the end of the other, mm.
+    pub length_mm: f32,
+}
+
+impl Lap {
+    /// From where to where it reaches on an axis of this length (m), 0 to 1.
+    #[must_use]
+    pub(crate) fn span(&self, length_m: f32) -> [f32; 2] {
+        let half = 0.5 * self.length_mm / (1000.0 * length_m);
+        [self.at - half, self.at + half]
+    }
+}
+
 /// Longitudinal bars.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -168,6 +204,20 @@ pub enum Bars {
         count: u32,
         /// Of one bar, mm.
         diameter_mm: f32,
+        /// Where they begin on the axis, 0 to 1. What begins or ends within 100 mm of a face that is
+        /// held along the axis goes on into what holds it, but for straight ends.
+        #[serde(default)]
+        from: f32,
+        /// Where they end on the axis (starter bars, curtailed bars), 0 to 1.
+        #[serde(default = "whole")]
+        to: f32,
+        /// How their first and their last end hold, where they slip.
+        #[serde(default)]
+        ends: [BarEnd; 2],
+        /// Where each of them is two bars, one of which takes over from the other: in their order
+        /// along the axis.
+        #[serde(default)]
+        laps: Vec<Lap>,
     },
     /// A row along one side.
     Row {
@@ -180,12 +230,20 @@ pub enum Bars {
         /// How much farther in than the first layer, mm: a second layer.
         #[serde(default)]
         inset_mm: f32,
-        /// Where they begin on the axis, 0 to 1.
+        /// Where they begin on the axis, 0 to 1. What begins or ends within 100 mm of a face that is
+        /// held along the axis goes on into what holds it, but for straight ends.
         #[serde(default)]
         from: f32,
-        /// Where they end (curtailed bars), 0 to 1.
+        /// Where they end on the axis (starter bars, curtailed bars), 0 to 1.
         #[serde(default = "whole")]
         to: f32,
+        /// How their first and their last end hold, where they slip.
+        #[serde(default)]
+        ends: [BarEnd; 2],
+        /// Where each of them is two bars, one of which takes over from the other: in their order
+        /// along the axis.
+        #[serde(default)]
+        laps: Vec<Lap>,
         /// Yield stress where it is another than that of the rest, MPa.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         f_y_mpa: Option<f32>,
@@ -193,10 +251,74 @@ pub enum Bars {
 }
 
 impl Bars {
+    /// Bars around the section along the whole of the axis.
+    #[must_use]
+    pub fn around(count: u32, diameter_mm: f32) -> Self {
+        Self::Around {
+            count,
+            diameter_mm,
+            from: 0.0,
+            to: 1.0,
+            ends: [BarEnd::Anchored; 2],
+            laps: Vec::new(),
+        }
+    }
+
     /// A layer of bars along the whole of one side.
     #[must_use]
     pub fn row(side_deg: f32, count: u32, diameter_mm: f32) -> Self {
-        Self::Row { side_deg, count, diameter_mm, inset_mm: 0.0, from: 0.0, to: 1.0, f_y_mpa: None }
+        Self::Row {
+            side_deg,
+            count,
+            diameter_mm,
+            inset_mm: 0.0,
+            from: 0.0,
+            to: 1.0,
+            ends: [BarEnd::Anchored; 2],
+            laps: Vec::new(),
+            f_y_mpa: None,
+        }
+    }
+
+    /// How many bars, of what diameter, mm.
+    #[must_use]
+    pub fn size(&self) -> (u32, f32) {
+        match *self {
+            Self::Around { count, diameter_mm, .. } | Self::Row { count, diameter_mm, .. } => {
+                (count, diameter_mm)
+            }
+        }
+    }
+
+    /// From where to where on the axis, 0 to 1.
+    #[must_use]
+    pub fn span(&self) -> [f32; 2] {
+        match *self {
+            Self::Around { from, to, .. } | Self::Row { from, to, .. } => [from, to],
+        }
+    }
+
+    /// How their first and their last end hold, where they slip.
+    #[must_use]
+    pub fn ends(&self) -> [BarEnd; 2] {
+        match *self {
+            Self::Around { ends, .. } | Self::Row { ends, .. } => ends,
+        }
+    }
+
+    /// Where they are lapped, in their order along the axis.
+    #[must_use]
+    pub fn laps(&self) -> &[Lap] {
+        match self {
+            Self::Around { laps, .. } | Self::Row { laps, .. } => laps,
+        }
+    }
+
+    /// Area of all its bars together, m²; of lapped ones outside of their laps.
+    #[must_use]
+    pub fn area(&self) -> f32 {
+        let (count, diameter_mm) = self.size();
+        count as f32 * diameter_mm * diameter_mm * std::f32::consts::FRAC_PI_4 * 1e-6
     }
 }
 

@@ -26,6 +26,12 @@ pub struct Matter {
     pub strength_mpa: Option<f32>,
 }
 
+/// Mean tensile strength of EN 1992-1-1, table 3.1, by the characteristic strength, MPa both.
+#[must_use]
+pub(crate) fn fctm(fck: f64) -> f64 {
+    if fck <= 50.0 { 0.3 * fck.powf(2.0 / 3.0) } else { 2.12 * (1.0 + (fck + 8.0) / 10.0).ln() }
+}
+
 /// EN 1992-1-1, 3.1.3 (5).
 fn as_concrete() -> f32 {
     10.0

@@ -131,15 +131,18 @@ impl Reinforcement {
         Some(Grade::named(&self.steel)?.at(self.f_y_mpa))
     }
 
-    /// Area of its longitudinal bars, m².
+    /// Area of its longitudinal bars in the section that has most of them, m²; `laps` not counted.
     #[must_use]
     pub fn area(&self) -> f32 {
-        let of = |bars: &Bars| match *bars {
-            Bars::Around { count, diameter_mm } | Bars::Row { count, diameter_mm, .. } => {
-                count as f32 * diameter_mm * diameter_mm
-            }
+        // Going along the axis, there are more only where some begin.
+        let in_section = |at: f32| {
+            let meets = |bars: &&Bars| {
+                let [from, to] = bars.span();
+                from <= at && at < to
+            };
+            self.bars.iter().filter(meets).map(Bars::area).sum::<f32>()
         };
-        self.bars.iter().map(of).sum::<f32>() * std::f32::consts::FRAC_PI_4 * 1e-6
+        self.bars.iter().map(|bars| in_section(bars.span()[0])).fold(0.0, f32::max)
     }
 }
 
@@ -154,6 +157,37 @@ impl InnerLining {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Starter bars count where they are, not on top of what begins above them.
+    #[test]
+    fn the_area_of_bars_is_that_of_the_section_that_has_most() {
+        let around = |from, to| Bars::Around {
+            count: 4,
+            diameter_mm: 20.0,
+            from,
+            to,
+            ends: Default::default(),
+            laps: Vec::new(),
+        };
+        let with = |bars| Reinforcement {
+            cover_mm: 40.0,
+            steel: "B500B".into(),
+            f_y_mpa: None,
+            bars,
+            stirrups: None,
+            bond: Default::default(),
+        };
+        let one = 4.0 * std::f32::consts::FRAC_PI_4 * 4e-4;
+        for (bars, sets) in [
+            (vec![], 0.0),
+            (vec![Bars::around(4, 20.0)], 1.0),
+            (vec![around(0.0, 0.5), around(0.5, 1.0)], 1.0),
+            (vec![around(0.0, 0.3), around(0.1, 1.0)], 2.0),
+        ] {
+            let area = with(bars).area();
+            assert!((area - sets * one).abs() < 1e-6 * one, "{area} {sets}");
+        }
+    }
 
     #[test]
     fn grades_are_read_by_name() {

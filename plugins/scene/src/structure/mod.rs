@@ -114,8 +114,30 @@ pub struct SteelLine {
     pub line: Vec<Vec3>,
     /// Of a bar or stirrup: what it is made of.
     pub grade: Option<Grade>,
+    /// Of a bar: how it holds to the concrete.
+    pub bond: Bond,
+    /// How its first and its last end hold, where it slips.
+    pub ends: [BarEnd; 2],
     /// How a tendon is stressed.
     pub prestress: Option<Prestress>,
+}
+
+impl SteelLine {
+    /// One of no known grade, without prestress and perfectly bonded. Its diameter and its points
+    /// are in m.
+    #[must_use]
+    pub fn new(name: String, part: Part, diameter: f32, line: Vec<Vec3>) -> Self {
+        Self {
+            name,
+            part,
+            diameter,
+            line,
+            grade: None,
+            bond: Bond::Perfect,
+            ends: [BarEnd::Anchored; 2],
+            prestress: None,
+        }
+    }
 }
 
 impl Structure {
