@@ -34,6 +34,7 @@
 
 mod band;
 mod column;
+mod columns;
 mod flexure;
 mod interaction;
 mod membrane;
