@@ -39,6 +39,7 @@ mod flexure;
 mod interaction;
 mod membrane;
 mod panel;
+mod prestressed;
 mod series;
 mod shear;
 mod slender;
