@@ -1,4 +1,5 @@
-//! Soesianawati (1986), unit 1, of the PEER and NIST tables: a column 400 × 400 mm, cantilever of
+//! Soesianawati (1986), unit 1, of the PEER and NIST tables (dimensions, strengths, cover and the
+//! 199.6 kN are those of row 129 of the ACI 369 database, see `columns.rs`): a column 400 × 400 mm, cantilever of
 //! 1600 mm, twelve 16 mm bars (f_y 446 MPa), hoops of 7 mm at 85 mm (364 MPa) of which 13 mm clear
 //! cover; f_c 46.5 MPa, axial load 744 kN. Half of it is computed. The hoops are laid as bars: they
 //! confine by what the concrete does, no law of confined concrete is given; all are 85 mm apart

@@ -17,7 +17,7 @@ const ROWS: [(f64, f64); 3] = [(0.05, 3.0), (0.2, 2.0), (0.35, 3.0)];
 const YIELD: f64 = 500e6;
 const HARDENS: f64 = 0.08 * YIELD / 0.05;
 /// MPa.
-const FCM: f64 = 38.0;
+pub(super) const FCM: f64 = 38.0;
 
 fn scene(axial: f64) -> String {
     let long = HALF + BEYOND;
@@ -46,7 +46,7 @@ fn scene(axial: f64) -> String {
 }
 
 /// Stress of concrete under a compressive strain, Pa: EN 1992-1-1 (3.14), nothing from .0035 on.
-fn pressed(strain: f64) -> f64 {
+pub(super) fn pressed(strain: f64) -> f64 {
     let first = 0.7e-3 * FCM.powf(0.31);
     let k = 1.05 * 22e3 * (0.1 * FCM).powf(0.3) * first / FCM;
     let eta = strain / first;

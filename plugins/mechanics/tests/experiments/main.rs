@@ -34,10 +34,12 @@
 
 mod band;
 mod column;
+mod columns;
 mod flexure;
 mod interaction;
 mod membrane;
 mod panel;
+mod prestressed;
 mod series;
 mod shear;
 mod slender;

@@ -4,6 +4,11 @@
 //! Bresler and Scordelis (1963), by Vecchio and Shim (2004): beams with stirrups, loaded in the
 //! middle. No. 9 bars of 28.7 mm 64 and 127 mm above the bottom, two No. 4 on top, stirrups No. 2;
 //! half of each is computed.
+//!
+//! From memory of the papers' tables, to be checked, but for what a model by others says of B3:
+//! width, depth (550 mm there), span, f_c, five bars of 28.5 mm in two rows and their 552 MPa
+//! (github.com/EdilsonMoraisSilva/RC-NonLinear-FEM-Q9, examples/example3_kang, after Kang 1977). It
+//! counts the 64 mm to the underside of the lower bars, where we count them to their middle.
 
 use intrados_mechanics::strength::Strength;
 use intrados_stage::cpu_seconds;
@@ -137,7 +142,7 @@ impl Observer for Talk {
 }
 
 /// What a member of a scene bears.
-fn strength(text: &str, element: Option<f64>) -> Strength {
+pub(super) fn strength(text: &str, element: Option<f64>) -> Strength {
     let begin = cpu_seconds();
     let life = jacked(text, element, &mut Talk::default());
     life.notes.iter().chain(&life.warnings).for_each(|n| println!("    {n}"));
@@ -152,7 +157,13 @@ fn strength(text: &str, element: Option<f64>) -> Strength {
 }
 
 /// Says a result beside what was measured; the ratio.
-fn beside(name: &str, found: &Strength, times: f64, measured: [f64; 2], mode: &str) -> f64 {
+pub(super) fn beside(
+    name: &str,
+    found: &Strength,
+    times: f64,
+    measured: [f64; 2],
+    mode: &str,
+) -> f64 {
     let ratio = times * 1e-3 * found.peak.load_n / measured[0];
     println!(
         "  {name}: {:.0} kN at {:.1} mm, measured {:.0} at {:.1}: {ratio:.3}; {} ({}), measured {mode}; {}",
