@@ -411,14 +411,49 @@ fn interrupted(scene: &Path, file: &Path) -> Vec<u8> {
     window.click("Attach evidence…");
     window.until_seen("Fill in its width, mm.");
     type_into(&mut window, "width, mm", "0.45");
+    left(window, file, "\"0.45\"")
+}
+
+/// Closes the window; gives what was kept of it until then, once that has this text in it.
+fn left(mut window: Window, file: &Path, text: &str) -> Vec<u8> {
     let mut kept = Vec::new();
     window.until("the session is kept", |_| {
         kept = fs::read(file).unwrap_or_default();
-        String::from_utf8_lossy(&kept).contains("\"0.45\"")
+        String::from_utf8_lossy(&kept).contains(text)
     });
     drop(window);
     assert!(!file.exists(), "a session that was ended leaves nothing behind");
     kept
+}
+
+/// What was typed into a member's sheet and not applied is offered as well, and then it stands in
+/// the form again; the scene's file has none of it.
+#[test]
+fn what_was_typed_into_a_sheet_before_a_crash_is_there_again() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scene = folder.path().join("lonely.ron");
+    fs::write(&scene, LONELY).expect("written");
+    let file = folder.path().join("state/session.json");
+    let mut window = keeping(&file);
+    window.ask(Action::Open(scene.clone()));
+    window.until("a scene", |w| w.contains_resource::<CurrentScene>());
+    window.ask(Action::Select(Some(0)));
+    window.frames(2);
+    window.click("Concrete, size, bars, loads");
+    window.until_seen("Apply");
+    window.frames(20);
+    type_into(&mut window, "width", "0.55");
+    let kept = left(window, &file, "\"0.55\"");
+    fs::write(&file, kept).expect("written");
+    let mut window = keeping(&file);
+    window.frames(2);
+    assert!(has(&window, "not saved is kept"));
+    window.click("Go on with it");
+    window.until_seen("width");
+    let typed = window.harness.get_by_label("width").accesskit_node().value();
+    assert_eq!(typed.as_deref(), Some("0.55"));
+    assert!(has(&window, "one value changed"));
+    assert_eq!(fs::read_to_string(&scene).expect("the scene"), LONELY);
 }
 
 fn keeping(file: &Path) -> Window {
