@@ -158,6 +158,8 @@ pub enum Action {
     ChooseSave,
     /// Write the window as it is seen, or one panel of it, as PNG.
     TakePicture(PathBuf, Option<String>),
+    /// Write all pictures that can be made of the scene into a folder, as PNG.
+    TakeViews(PathBuf),
     /// Put the window as it is seen on the clipboard, or one panel of it.
     CopyPicture(Option<String>),
     /// Show or hide the list of keys.
@@ -219,6 +221,7 @@ fn carry_out(world: &mut World, action: Action) {
             Dialogs::open(world, Purpose::Take(name));
         }
         Action::TakePicture(path, panel) => take_picture(world, Some(path), panel),
+        Action::TakeViews(folder) => world.resource_mut::<Saving>().take_views(folder),
         Action::CopyPicture(panel) => take_picture(world, None, panel),
         Action::Open(path) => open(world, path),
         Action::MakeProject => make_project(world, None),

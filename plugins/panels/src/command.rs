@@ -89,6 +89,7 @@ fn fixed(look: &Look) -> Vec<Command> {
             None,
             Action::Save(Taken::Picture(Some("Structure".into()))),
         ),
+        command(tr!("save all views"), "", None, Action::Save(Taken::Views)),
         command(
             tr!("copy a picture of the window"),
             "Ctrl+Shift+C",

@@ -4,6 +4,7 @@
 mod lang;
 
 mod action;
+mod album;
 mod attach;
 mod banner;
 mod chart;

@@ -3,14 +3,15 @@
 use std::{collections::HashSet, fs, path::Path};
 
 use bevy_ecs::world::World;
-use egui::{Key, Modifiers};
+use egui::{Key, Modifiers, accesskit::Role};
 use egui_kittest::kittest::{NodeT, Queryable};
 use glam::{Mat4, Vec3};
 use intrados_forecast::ForecastSettings;
 use intrados_light::Render;
 use intrados_mechanics::plugin::{Analyses, ShownAt};
 use intrados_panels::{
-    Action, Latest, Lengths, Log, Look, PanelsPlugin, Refine, Selection, Viewpoint, Workspace,
+    Action, Latest, Lengths, Log, Look, PanelsPlugin, Refine, Selection, Taken, Viewpoint,
+    Workspace,
 };
 use intrados_predict::{PredictSettings, Predicting};
 use intrados_scene::{Camera, Part, Scene, parametric::write_glb, plugin::CurrentScene};
@@ -91,6 +92,43 @@ fn tools_are_put_away_for_a_picture_of_the_structure() {
     window.frame();
     assert!(window.harness.query_by_label("As it looks").is_none());
     assert!(window.harness.query_by_label("Damage of members").is_some());
+}
+
+/// All views of a structure, its slice among them, become files whose names say what they show.
+#[test]
+fn all_views_are_saved_into_a_folder() {
+    let mut window = with_column();
+    window.until("a camera", |w| w.resource::<Viewpoint>().camera().is_some());
+    window.ask(Action::KeepView("from the river".into()));
+    window.ask(Action::Select(Some(1)));
+    window.ask(Action::Tab("CT"));
+    window.until_seen("CT slice");
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("views");
+    window.ask(Action::Save(Taken::Views));
+    window.frames(3);
+    type_into(&mut window, "Folder to write", &out.display().to_string());
+    window.harness.get_by_role_and_label(Role::Button, "Save").click();
+    window.until("the pictures", |w| {
+        w.resource::<Log>().lines().iter().any(|line| line.contains(" files into "))
+    });
+    let picture = |name: &str| {
+        let file = out.join(format!("{name}.png"));
+        image::open(&file).unwrap_or_else(|why| panic!("{name}: {why}")).into_rgb8()
+    };
+    let [front, side, above] =
+        ["front", "side", "top"].map(|name| picture(&format!("structure-{name}")));
+    assert!(front != side && side != above);
+    picture("structure");
+    picture("structure-view-from_the_river");
+    let camera = window.with(|w| w.resource::<CurrentScene>().0.cameras[0].name.clone());
+    picture(&format!("structure-camera-{camera}"));
+    let files: Vec<String> = fs::read_dir(&out)
+        .expect("the folder")
+        .map(|entry| entry.expect("a file").file_name().to_string_lossy().into_owned())
+        .collect();
+    let slice = files.iter().find(|name| name.starts_with("ct-") && name.contains("slice_1"));
+    assert!(slice.is_some(), "{files:?}");
 }
 
 /// A digit is a side of the structure, but an estimator where the picture of light is seen; the

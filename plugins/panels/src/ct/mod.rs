@@ -25,6 +25,7 @@ use source::{Read, Source};
 
 use crate::{
     Action, Actions, Selection,
+    album::{self, Leaf},
     lang::{drag, term},
     members,
     zoom::Zoom,
@@ -119,9 +120,36 @@ impl Ct {
         shown.read.plane.filter(|_| *hash == scene.hash && *of == member)
     }
 
+    /// The slice that was shown last with what was found in it, and its legend, where it is of this
+    /// scene.
+    pub(crate) fn leaf(&self, ui: &Ui, scene: &Scene) -> Option<Leaf> {
+        let ((hash, member, origin, ..), index) = self.of.as_ref()?;
+        let member = scene.members.get(*member).filter(|_| *hash == scene.hash)?;
+        // While another slice is read, it is the one before that is seen.
+        let shown = self.shown.as_ref().filter(|_| self.task.is_none())?.as_ref().ok()?;
+        let read = &shown.read;
+        let window = self.window.unwrap_or_else(|| read.suitable());
+        let mut image = draw::grey(read, window);
+        let labels = draw::labels(read, self.overlay);
+        image.pixels.iter_mut().zip(labels.pixels).for_each(|(pixel, on)| *pixel = pixel.blend(on));
+        let what = album::said(scene, &format!("{}, {}", member.name, read.caption()));
+        let unit = unit(*origin);
+        Some(Leaf {
+            name: format!("ct-{}-slice {}", member.id, index + 1),
+            legend: Some(picture::printed(read, window, unit, &what).drawn(ui, image.width())),
+            what,
+            draw: Box::new(move || image),
+        })
+    }
+
     fn method(&self) -> Method {
         self.method.unwrap_or(Method::Network)
     }
+}
+
+/// In what the grey of slices is.
+fn unit(origin: Origin) -> &'static str {
+    if origin == Origin::Scanned { "1/m" } else { "grey" }
 }
 
 pub(crate) fn ct(
@@ -186,7 +214,7 @@ pub(crate) fn ct(
     {
         return scan::sinogram(ui, &mut ct.forming, scan, area);
     }
-    let unit = if origin == Origin::Scanned { "1/m" } else { "grey" };
+    let unit = unit(origin);
     let left = Rect::from_min_max(
         area.min,
         pos2((area.right() - ASIDE - 8.0).max(area.left() + 120.0), area.bottom()),

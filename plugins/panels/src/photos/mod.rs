@@ -2,6 +2,7 @@
 //! then what it shows of the member, without the light, is read.
 
 mod model;
+mod prints;
 mod sheet;
 mod work;
 
@@ -180,7 +181,8 @@ impl Shot {
         if let Some(done) = Task::take(&mut self.placing) {
             self.located = Some(match done {
                 Ok(Ok(Placed { located, picture })) => {
-                    self.texture.set(picture, TextureOptions::LINEAR);
+                    self.texture.set(picture.clone(), TextureOptions::LINEAR);
+                    self.opened.picture = picture;
                     Ok(located)
                 }
                 Ok(Err(why)) => Err(why),

@@ -4,6 +4,7 @@ mod compass;
 mod flight;
 mod measure;
 mod model;
+mod prints;
 mod section;
 mod settled;
 mod slice;
