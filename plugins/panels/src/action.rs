@@ -119,6 +119,8 @@ pub enum Action {
     Lengths(Lengths),
     /// Show numbers in these colours.
     Colours(Colours),
+    /// See pictures that are compared from one place and equally enlarged, or each by itself.
+    Link,
     /// Fill the screen, or no more.
     Fullscreen,
     /// Close the window.
@@ -294,6 +296,7 @@ fn carry_out(world: &mut World, action: Action) {
         Action::Speak(language) => world.resource_mut::<Desk>().speak(language),
         Action::Lengths(lengths) => world.resource_mut::<Desk>().measure_in(lengths),
         Action::Colours(colours) => world.resource_mut::<Look>().colours = colours,
+        Action::Link => world.resource_mut::<Desk>().swap_links(),
         Action::Fullscreen => world.resource_mut::<Layout>().toggle_fullscreen(),
         Action::Quit => world.resource_mut::<Layout>().quits = true,
         Action::Slice(index) => {

@@ -163,6 +163,7 @@ fn fixed(look: &Look) -> Vec<Command> {
         command(tr!("light or error"), "E", by(NONE, Key::E), Action::ShowQuantity(quantity)),
         command(tr!("keep the picture as reference"), "", None, Action::KeepReference),
         command(tr!("let the reference go"), "", None, Action::LetReferenceGo),
+        command(tr!("link compared pictures, or part them"), "", None, Action::Link),
         command(tr!("go on with the prediction"), "", None, Action::Predict),
         command(tr!("compare with an earlier prediction"), "", None, Action::ChoosePrediction),
         command(tr!("reload the scene"), "", None, Action::Reload),

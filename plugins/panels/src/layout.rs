@@ -342,6 +342,14 @@ fn menu(ui: &mut Ui, world: &mut World) {
             let mut look = *world.resource::<Look>();
             ui.checkbox(&mut look.outline, tr!("Outline the selected member"));
             world.resource_mut::<Look>().set_if_neq(look);
+            let mut links = world.resource::<Desk>().links();
+            let hint = tr!(
+                "An earlier prediction is seen from where the newest is, and the next photograph or slice as enlarged as the one before"
+            );
+            let link = ui.checkbox(&mut links, tr!("Link compared pictures"));
+            if link.on_hover_text(hint).changed() {
+                asked.push(Action::Link);
+            }
             ui.separator();
             let log = ui.button(tr!("Log of this session"));
             if log.on_hover_text(tr!("All that was said, read again")).clicked() {

@@ -90,14 +90,19 @@ pub(crate) fn render(
         _ => tr!("Picture"),
     };
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, &name));
-    ui.painter().rect_filled(rect, 0.0, Color32::BLACK);
+    let is_light = look.quantity == Quantity::Radiance;
+    hand(ui, &response, rect, line, reference, is_light, &mut viewpoint);
+    // Of a picture that is enlarged beside its reference, a part is seen.
+    let place = if is_light { reference.place(rect) } else { rect };
+    let painter = ui.painter().with_clip_rect(rect);
+    painter.rect_filled(rect, 0.0, Color32::BLACK);
     let whole = Rect::from_min_max(Pos2::ZERO, pos2(1.0, 1.0));
     if let Quantity::Field(side) = look.quantity {
         field(ui, rect, side, &learning, &mut fields);
     } else if let Some(texture) = picture.bypass_change_detection().texture(ui.ctx()) {
-        ui.painter().image(texture.id(), rect, whole, Color32::WHITE);
+        painter.image(texture.id(), place, whole, Color32::WHITE);
     }
-    if look.quantity == Quantity::Radiance {
+    if is_light {
         // What is held against a reference is the picture as it is.
         if !reference.is_kept()
             && let Some(texture) = smoothed.texture(ui.ctx())
@@ -105,21 +110,20 @@ pub(crate) fn render(
             ui.painter().image(texture, rect, whole, Color32::WHITE);
             smooth::mark(ui, rect);
         }
-        reference.draw(ui, rect, &look);
+        reference.draw(ui, [place, rect], &look);
     }
     if let Some(texture) = outline.bypass_change_detection().texture(ui.ctx()) {
-        ui.painter().image(texture.id(), rect, whole, Color32::WHITE);
+        painter.image(texture.id(), place, whole, Color32::WHITE);
     }
-    hand(ui, &response, rect, line, &mut viewpoint);
-    line.draw(&ui.painter().with_clip_rect(rect), rect);
-    if look.quantity == Quantity::Radiance {
-        reference.divider(ui, rect);
+    line.draw(&painter, place);
+    if is_light {
+        reference.divider(ui, [place, rect]);
     }
-    let under = response.hover_pos().map(|at| under(&lit, render.camera(), rect, at));
+    let under = response.hover_pos().map(|at| under(&lit, render.camera(), place, at));
     cursor.set_if_neq(Cursor(under));
     if response.clicked() {
         if let Some(at) = response.interact_pointer_pos() {
-            fields.pick((at - rect.min) / rect.size());
+            fields.pick((at - place.min) / place.size());
         }
         let member = under.and_then(|u| lit.0.scene.objects.get(u.hit?.0)?.member);
         actions.ask(Action::Select(member.filter(|m| selection.0 != Some(*m))));
@@ -202,23 +206,30 @@ fn under(lit: &Lit, camera: &Camera, rect: Rect, at: Pos2) -> Under {
 }
 
 /// Drag to orbit, or to draw where the tool is out; Shift or middle or right drag to pan, wheel to
-/// come nearer.
+/// come nearer. Beside its reference the picture of light is enlarged instead.
 fn hand(
     ui: &Ui,
     response: &egui::Response,
     rect: Rect,
     line: &mut LightLine,
+    reference: &mut Reference,
+    is_light: bool,
     viewpoint: &mut ResMut<Viewpoint>,
 ) {
     let draws = line.is_on()
         && response.dragged_by(PointerButton::Primary)
         && !ui.input(|i| i.modifiers.shift);
     if draws {
-        line.drag(ui, rect);
+        line.drag(ui, if is_light { reference.place(rect) } else { rect });
     }
-    let held = response.dragged() && !draws;
+    let is_dragged = response.dragged() && !draws;
+    let enlarges = is_light && reference.hand(ui, response, rect, is_dragged);
+    let held = is_dragged && !enlarges;
     if viewpoint.dragged != held {
         viewpoint.dragged = held;
+    }
+    if enlarges {
+        return;
     }
     let Some(camera) = viewpoint.camera().cloned() else { return };
     let delta = response.drag_delta();

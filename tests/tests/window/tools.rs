@@ -3,7 +3,7 @@
 use std::{collections::HashSet, fs, path::Path};
 
 use bevy_ecs::world::World;
-use egui::{Key, Modifiers, accesskit::Role};
+use egui::{Event, Key, Modifiers, MouseWheelSource, MouseWheelUnit, TouchPhase, accesskit::Role};
 use egui_kittest::kittest::{NodeT, Queryable};
 use glam::{Mat4, Vec3};
 use intrados_forecast::ForecastSettings;
@@ -17,7 +17,11 @@ use intrados_predict::{PredictSettings, Predicting};
 use intrados_scene::{Camera, Part, Scene, parametric::write_glb, plugin::CurrentScene};
 use intrados_stage::{Job, Jobs, Task, Work};
 
-use super::{LONELY, Window, export, press, rest, type_into, with_column, with_lonely};
+use super::{
+    LONELY, Window, export,
+    forms::{EARLIER, with_seen},
+    press, rest, type_into, with_column, with_lonely,
+};
 
 /// Whether anything in the window has this text in its name.
 fn has(window: &Window, text: &str) -> bool {
@@ -691,6 +695,76 @@ fn a_picture_is_held_against_its_reference() {
     assert!(window.harness.query_by_label("Wipe").is_none(), "it is kept for another camera");
     let said = |w: &mut World| w.resource::<Log>().lines().iter().any(|l| l.contains("is let go"));
     assert!(window.with(said));
+}
+
+/// The wheel enlarges a picture and its reference alike, where a camera that comes nearer would let
+/// the reference go; and what is enlarged is pulled about.
+#[test]
+fn the_wheel_enlarges_a_picture_and_its_reference_alike() {
+    let mut window = Window::with_scene("cornell");
+    window.until("some light", |w| w.resource::<Render>().samples_per_pixel() > 4.0);
+    window.click("⏸ Pause");
+    window.click("Keep as reference");
+    window.frames(20);
+    let rect = window.harness.get_by_label("Picture").rect();
+    let camera = window.with(|w| w.resource::<Viewpoint>().camera().cloned());
+    let seen = |window: &mut Window, shown: &str| {
+        window.click(shown);
+        window.frames(3);
+        columns(&window.picture(), rect)
+    };
+    let whole = seen(&mut window, "This picture");
+    let at = rect.lerp_inside(egui::vec2(0.3, 0.6));
+    window.harness.event(Event::PointerMoved(at));
+    window.harness.event(Event::MouseWheel {
+        unit: MouseWheelUnit::Point,
+        delta: egui::vec2(0.0, 240.0),
+        phase: TouchPhase::Move,
+        source: MouseWheelSource::Unknown,
+        modifiers: Modifiers::NONE,
+    });
+    window.frames(40);
+    let [own, reference] = ["This picture", "Reference"].map(|shown| seen(&mut window, shown));
+    assert_ne!(own, whole, "nothing is enlarged");
+    assert_eq!(own, reference);
+    draw(&mut window, rect.center(), rect.center() + egui::vec2(40.0, 0.0));
+    let [pulled, reference] = ["This picture", "Reference"].map(|shown| seen(&mut window, shown));
+    assert_ne!(pulled, own, "nothing is pulled");
+    assert_eq!(pulled, reference);
+    assert_eq!(window.with(|w| w.resource::<Viewpoint>().camera().cloned()), camera);
+    assert!(window.harness.query_by_label("Wipe").is_some(), "the reference is gone");
+}
+
+/// An earlier prediction is turned with the newest, until they are parted.
+#[test]
+fn compared_pictures_are_turned_together_until_they_are_parted() {
+    let (mut window, folder) = with_seen();
+    window.until("the prediction", |w| {
+        w.get_resource::<Latest>().is_some_and(|l| l.result.is_some())
+    });
+    let file = folder.path().join("predict.json");
+    fs::write(&file, EARLIER).expect("written");
+    window.until("a camera", |w| w.resource::<Viewpoint>().camera().is_some());
+    window.ask(Action::Compare(file));
+    window.frames(3);
+    let mut kept = 0;
+    let mut newest = |window: &mut Window| {
+        window.ask(Action::KeepView(String::new()));
+        window.frames(2);
+        kept += 1;
+        view(window, kept - 1)
+    };
+    let rect = window.harness.get_by_label("Damage of members in an earlier prediction").rect();
+    let at = rect.center();
+    let before = newest(&mut window);
+    draw(&mut window, at, at + egui::vec2(60.0, 0.0));
+    let together = newest(&mut window);
+    assert!(together.position.distance(before.position) > 0.1);
+    window.ask(Action::Link);
+    window.frames(3);
+    draw(&mut window, at, at + egui::vec2(60.0, 0.0));
+    let parted = newest(&mut window);
+    assert!(parted.position.distance(together.position) < 1e-3);
 }
 
 /// FLIP is computed off the frame, anew for another view, and shown pixel by pixel.

@@ -28,6 +28,7 @@ use crate::{
     album::{self, Leaf},
     lang::{drag, term},
     members,
+    workspace::Desk,
     zoom::Zoom,
 };
 
@@ -162,6 +163,7 @@ pub(crate) fn ct(
     mut ct: ResMut<Ct>,
     mut jobs: ResMut<Jobs>,
     mut actions: ResMut<Actions>,
+    desk: Res<Desk>,
 ) {
     let ct = ct.bypass_change_detection();
     if let Some(predicting) = predicting {
@@ -204,7 +206,7 @@ pub(crate) fn ct(
     ct.index = ct.index.min(sources.len() - 1);
     let volume = done.map_or(0, |d| Arc::as_ptr(&d.restored) as usize);
     let stack = (scene.hash.clone(), member, origin, volume, ct.method());
-    ask(ct, scene, &sources, stack, &mut jobs);
+    ask(ct, scene, &sources, stack, desk.links(), &mut jobs);
     collect(ui, ct);
     tools(ui, ct, &sources, scan.is_some());
     let mut area = ui.available_rect_before_wrap();
@@ -277,6 +279,7 @@ fn ask(
     scene: &Arc<Scene>,
     sources: &[(String, Source)],
     stack: Stack,
+    is_linked: bool,
     jobs: &mut Jobs,
 ) {
     let wanted = (stack.clone(), ct.index);
@@ -284,7 +287,12 @@ fn ask(
         // Of the same stack the slice before stays until the new one is there.
         let same = ct.of.as_ref().is_some_and(|(of, _)| *of == stack);
         if !same {
-            (ct.shown, ct.view) = (None, Zoom::default());
+            ct.shown = None;
+        }
+        // As scanned and as told, by one method and by another, the same place of a member is seen.
+        let of_one = |of: &Stack| (&of.0, of.1) == (&stack.0, stack.1);
+        if !same && !(is_linked && ct.of.as_ref().is_some_and(|(of, _)| of_one(of))) {
+            ct.view = Zoom::default();
         }
         ct.picked = None;
         ct.of = Some(wanted);

@@ -34,6 +34,7 @@ use crate::{
     moment::{Courses, Moment, Seen, Timeline},
     play::Play,
     saving::Saving,
+    workspace::Desk,
 };
 
 /// What one row of tools covers at the head of the picture, with a little air, points.
@@ -97,6 +98,8 @@ pub(crate) struct Structure {
     tape: Tape,
     /// Where on its member the evidence is that a form asks for.
     place: Option<Vec3>,
+    /// An earlier prediction is seen from where the newest is.
+    is_linked: bool,
     wished: Option<View>,
     /// A camera through which somebody wants to look, and the hash of the scene that it is of; it
     /// waits until the panel is in sight.
@@ -118,6 +121,7 @@ impl Default for Structure {
             section: None,
             tape: Tape::default(),
             place: None,
+            is_linked: true,
             wished: None,
             followed: None,
             is_lit: false,
@@ -272,10 +276,12 @@ pub(crate) fn structure(
     ct: Res<Ct>,
     mut jobs: ResMut<Jobs>,
     mut actions: ResMut<Actions>,
+    desk: Res<Desk>,
 ) {
     let Some(scene) = scene else { return };
     let scene = &scene.0;
     let jobs = jobs.bypass_change_detection();
+    structure.bypass_change_detection().is_linked = desk.links();
     let whole = ui.available_rect_before_wrap();
     let history = history.bypass_change_detection();
     let structure = structure.bypass_change_detection();
@@ -332,7 +338,9 @@ pub(crate) fn structure(
         };
         structure.model.names(ui, rect, scene, &value, *selection, &pointed.camera);
     }
-    structure.earlier.follow(&pointed.camera);
+    if structure.is_linked {
+        structure.earlier.follow(&pointed.camera);
+    }
     compass::draw(ui, rect, &pointed.camera);
     let sliced = selection.0.and_then(|member| Some((member, ct.plane(scene, member)?)));
     if let Some((member, plane)) = sliced {
@@ -375,7 +383,7 @@ fn to_light(ui: &mut Ui, rect: Rect, actions: &mut Actions) {
     }
 }
 
-/// The structure as an earlier prediction has it, from the same side.
+/// The structure as an earlier prediction has it, from the same side unless both were parted.
 fn beside(
     ui: &mut Ui,
     rect: Rect,
@@ -391,7 +399,9 @@ fn beside(
         structure.earlier.show(ui, rect, scene, &seen, Scale::DAMAGE, selection, section, jobs);
     let Some(pointed) = shown else { return };
     model::ruler(ui, rect, &pointed.camera);
-    structure.model.follow(&pointed.camera);
+    if structure.is_linked {
+        structure.model.follow(&pointed.camera);
+    }
     if structure.names {
         let value = |i: usize| earlier.member(&scene.members[i].id)?.damage().map(|d| d.value);
         structure.earlier.names(ui, rect, scene, &value, selection, &pointed.camera);
