@@ -29,6 +29,7 @@ use crate::{
     reference::{self, Reference},
     saving::{Saving, Taken},
     structure::{self, Structure},
+    trail,
     views::{self, Views},
     workspace::{self, Desk},
 };
@@ -99,6 +100,10 @@ pub enum Action {
     Jump(Jump),
     /// Go through them by itself, or stop.
     Play,
+    /// Go back to the member, the view and the tabs of before.
+    Back,
+    /// Go forward again.
+    Forward,
     /// Bring a panel to the front, by its name; it is opened where it was closed.
     Tab(&'static str),
     /// Show the picture of light, in the expert's layout; which layout structures open in stays.
@@ -200,7 +205,10 @@ pub(crate) fn act(world: &mut World) {
     // What is said before the first frame is drawn is said in it, too.
     workspace::speak(world);
     for action in std::mem::take(&mut world.resource_mut::<Actions>().0) {
+        let travels = matches!(action, Action::Back | Action::Forward);
+        let stop = trail::here(world).filter(|_| !travels);
         carry_out(world, action);
+        stop.into_iter().for_each(|stop| trail::leave(world, stop));
     }
 }
 
@@ -281,6 +289,8 @@ fn carry_out(world: &mut World, action: Action) {
         Action::Step(forward) => step(world, forward),
         Action::Jump(to) => play::jump(world, to),
         Action::Play => play::toggle(world),
+        Action::Back => trail::go(world, false),
+        Action::Forward => trail::go(world, true),
         Action::Tab(name) => show_tab(world, name),
         Action::Light => world.resource_mut::<Desk>().light(),
         Action::Panel(name, true) => show_tab(world, &name),

@@ -46,7 +46,9 @@ use crate::{
     smooth::Smoothed,
     start,
     stress::Stress,
-    toast, views,
+    toast,
+    trail::Trail,
+    views,
     workspace::{self, Desk},
 };
 
@@ -330,6 +332,16 @@ fn menu(ui: &mut Ui, world: &mut World) {
             }
         });
         ui.menu_button(tr!("View"), |ui| {
+            let of = scene.as_ref().map(|s| s.path.clone()).unwrap_or_default();
+            let ways = world.resource::<Trail>().ways(&of).into_iter();
+            for (may, (name, keys, action)) in ways.zip([
+                (tr!("Back|way"), "Alt+Left", Action::Back),
+                (tr!("Forward|way"), "Alt+Right", Action::Forward),
+            ]) {
+                if ui.add_enabled(may, egui::Button::new(name).shortcut_text(keys)).clicked() {
+                    asked.push(action);
+                }
+            }
             for (name, keys, action) in [
                 (tr!("Fit into the picture"), "F", Action::Frame),
                 (tr!("Scene's camera"), "Home", Action::Home),

@@ -57,6 +57,7 @@ mod stress;
 mod structure;
 mod surface;
 mod toast;
+mod trail;
 mod values;
 mod viewpoint;
 mod views;

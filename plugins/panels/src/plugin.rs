@@ -11,7 +11,7 @@ use crate::{
     Viewpoint, action, attach, banner, command, convergence, create, ct, dialog, directions, drops,
     edits, export, fields, history, inspector, layout, light_line, log, members, meters, moment,
     outline, photos, picture, place::Panels, play, prediction, recent, reference, refine, render,
-    report, saving, session, sheet, smooth, statistics, steering, stress, structure, toast,
+    report, saving, session, sheet, smooth, statistics, steering, stress, structure, toast, trail,
     viewpoint, views, workspace,
 };
 
@@ -97,6 +97,7 @@ impl Plugin for PanelsPlugin {
             .init_resource::<edits::Edits>()
             .init_resource::<create::Creation>()
             .init_resource::<toast::Toasts>()
+            .init_resource::<trail::Trail>()
             .init_resource::<saving::Saving>()
             .init_resource::<structure::Structure>()
             .insert_resource(desk)

@@ -383,6 +383,16 @@ impl Desk {
         self.drawn.contains_key(name)
     }
 
+    /// Panels that were seen in the last frame.
+    pub(crate) fn in_sight(&self) -> Vec<String> {
+        self.drawn.keys().cloned().collect()
+    }
+
+    /// Whether a panel is to be brought to the front that was not seen in the last frame.
+    pub(crate) fn is_turning(&self) -> bool {
+        self.wanted.iter().any(|name| !self.drawn.contains_key(name))
+    }
+
     /// Where a panel was in the last frame.
     pub(crate) fn place(&self, name: &str) -> Option<Rect> {
         self.drawn.get(name).copied()

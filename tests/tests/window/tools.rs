@@ -697,6 +697,41 @@ fn a_picture_is_held_against_its_reference() {
     assert!(window.with(said));
 }
 
+/// Alt and an arrow go back through members, sides and tabs, and forward again, as in a browser.
+#[test]
+fn one_goes_back_to_where_one_was_and_forward_again() {
+    let mut window = with_column();
+    window.until("a camera", |w| w.resource::<Viewpoint>().camera().is_some());
+    let go = |window: &mut Window, key: Key| {
+        window.harness.key_press_modifiers(Modifiers::ALT, key);
+        window.frames(4);
+    };
+    let selected = |window: &Window| window.with(|w| w.resource::<Selection>().0);
+    window.ask(Action::Select(Some(0)));
+    window.frames(2);
+    window.ask(Action::Select(Some(1)));
+    window.frames(2);
+    window.ask(Action::Tab("CT"));
+    window.until_seen("CT slice");
+    go(&mut window, Key::ArrowLeft);
+    assert!(has(&window, "Damage of members"), "the tab of before");
+    assert_eq!(selected(&window), Some(1));
+    go(&mut window, Key::ArrowLeft);
+    assert_eq!(selected(&window), Some(0));
+    go(&mut window, Key::ArrowRight);
+    assert_eq!(selected(&window), Some(1));
+    window.harness.key_press(Key::Num1);
+    window.frames(3);
+    window.harness.key_press(Key::Num7);
+    window.frames(3);
+    go(&mut window, Key::ArrowLeft);
+    window.ask(Action::KeepView(String::new()));
+    window.frames(2);
+    let front = view(&mut window, 0);
+    let along = (front.target - front.position).normalize();
+    assert!(along.z < -0.9, "it is not seen from the front: {along}");
+}
+
 /// The wheel enlarges a picture and its reference alike, where a camera that comes nearer would let
 /// the reference go; and what is enlarged is pulled about.
 #[test]

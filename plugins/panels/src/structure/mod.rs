@@ -151,6 +151,11 @@ impl Structure {
         self.followed.as_ref().map(|(_, camera)| camera).or(self.model.camera())
     }
 
+    /// Whether somebody wants to look from elsewhere.
+    pub(crate) fn is_called(&self) -> bool {
+        self.wished.is_some() || self.followed.is_some()
+    }
+
     /// Looks at the scene from there, whatever else was wished before; whoever goes
     /// elsewhere flies no more.
     pub(crate) fn follow(&mut self, scene: &Scene, camera: &Camera) {
@@ -592,7 +597,7 @@ fn views(ui: &mut Ui, structure: &mut Structure, selection: Selection, actions: 
     }
     for (aspect, key) in Aspect::ALL {
         if ui.button(aspect.name()).on_hover_text(key).clicked() {
-            structure.look_from(aspect);
+            actions.ask(Action::LookFrom(aspect));
         }
     }
 }
