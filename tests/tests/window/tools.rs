@@ -770,6 +770,40 @@ fn the_wheel_enlarges_a_picture_and_its_reference_alike() {
     assert!(window.harness.query_by_label("Wipe").is_some(), "the reference is gone");
 }
 
+/// What was framed in half of the panel, beside an earlier prediction, is seen as a whole when it has
+/// all of the panel again.
+#[test]
+fn what_was_framed_in_a_comparison_is_seen_as_a_whole_after_it() {
+    let (mut window, folder) = with_seen();
+    window.until("the prediction", |w| {
+        w.get_resource::<Latest>().is_some_and(|l| l.result.is_some())
+    });
+    window.until("a camera", |w| w.resource::<Viewpoint>().camera().is_some());
+    let file = folder.path().join("predict.json");
+    fs::write(&file, EARLIER).expect("written");
+    window.ask(Action::Compare(file));
+    window.frames(3);
+    window.ask(Action::Frame);
+    window.frames(3);
+    window.click("Compare");
+    window.until_seen("Nothing");
+    window.click("Nothing");
+    window.frames(3);
+    window.ask(Action::KeepView(String::new()));
+    window.frames(2);
+    let rect = window.harness.get_by_label("Damage of members").rect();
+    let [width, height] = [rect.width(), rect.height()].map(|n| n as u32);
+    let camera = Camera { width, height, ..view(&mut window, 0) };
+    let [low, high] = window.with(|w| w.resource::<CurrentScene>().0.bounds());
+    let ([right, up, forward], [hx, hy]) = (camera.frame(), camera.half_extent());
+    for corner in 0..8_u8 {
+        let end = |k: usize| if corner >> k & 1 == 1 { high[k] } else { low[k] };
+        let d = Vec3::from_array(std::array::from_fn(end)) - camera.position;
+        let [x, y] = [d.dot(right) / hx, d.dot(up) / hy].map(|s| s / d.dot(forward));
+        assert!(x.abs() < 1.0 && y.abs() < 1.0, "{corner}: {x} {y}");
+    }
+}
+
 /// An earlier prediction is turned with the newest, until they are parted.
 #[test]
 fn compared_pictures_are_turned_together_until_they_are_parted() {

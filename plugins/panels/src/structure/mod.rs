@@ -32,6 +32,7 @@ use crate::{
     history::{Earlier, History},
     lang::fixed,
     moment::{Courses, Moment, Seen, Timeline},
+    orbit,
     play::Play,
     saving::Saving,
     workspace::Desk,
@@ -100,6 +101,8 @@ pub(crate) struct Structure {
     place: Option<Vec3>,
     /// An earlier prediction is seen from where the newest is.
     is_linked: bool,
+    /// Where it was looked at from before the picture was parted in two.
+    parted: Option<Camera>,
     wished: Option<View>,
     /// A camera through which somebody wants to look, and the hash of the scene that it is of; it
     /// waits until the panel is in sight.
@@ -122,6 +125,7 @@ impl Default for Structure {
             tape: Tape::default(),
             place: None,
             is_linked: true,
+            parted: None,
             wished: None,
             followed: None,
             is_lit: false,
@@ -180,6 +184,24 @@ impl Structure {
             let member = member.filter(|_| view == View::Framed);
             self.model.go(view, scene, member);
             self.model.camera().iter().for_each(|camera| self.earlier.follow(camera));
+        }
+    }
+
+    /// Two pictures have half of the panel each. Once one has all of it again, as wide, all of what
+    /// was seen is still seen, if anybody has moved there; else it is as it was before.
+    fn part(&mut self, is_compared: bool, width: f32) {
+        let Some(camera) = self.model.camera().cloned() else { return };
+        if is_compared {
+            self.parted.get_or_insert(camera);
+            return;
+        }
+        let Some(before) = self.parted.take() else { return };
+        let place = |c: &Camera| (c.position, c.target, c.fov_deg);
+        if place(&before) != place(&camera) {
+            // The angle is across the width: of a wider picture of the same angle less of the height
+            // is seen.
+            let wider = width / camera.width.max(1) as f32;
+            self.aim(&orbit::dolly(&camera, wider.max(1.0)));
         }
     }
 
@@ -290,6 +312,7 @@ pub(crate) fn structure(
     let whole = ui.available_rect_before_wrap();
     let history = history.bypass_change_detection();
     let structure = structure.bypass_change_detection();
+    structure.part(history.beside().is_some(), whole.width());
     structure.go(scene, selection.0, history.beside().is_some());
     structure.fly(ui, scene, *selection);
     let section = structure.section;
