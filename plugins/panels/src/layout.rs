@@ -198,6 +198,7 @@ pub fn show(ui: &mut Ui, world: &mut World) {
     let [start, sheet, form, saving, creation] = own(world);
     session::offer(ui, world);
     banner::show(ui, world);
+    drops::offer(ui, world);
     if world.contains_resource::<CurrentScene>() && !world.resource::<Layout>().start {
         panels(ui, world);
     } else {

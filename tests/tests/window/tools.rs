@@ -1,6 +1,6 @@
 //! Tools of the structure's picture and of the sheet, and what is left of a session that broke off.
 
-use std::{collections::HashSet, fs, path::Path};
+use std::{collections::HashSet, fs, path::Path, sync::Arc};
 
 use bevy_ecs::world::World;
 use egui::{Event, Key, Modifiers, MouseWheelSource, MouseWheelUnit, TouchPhase, accesskit::Role};
@@ -18,7 +18,7 @@ use intrados_scene::{Camera, Part, Scene, parametric::write_glb, plugin::Current
 use intrados_stage::{Job, Jobs, Task, Work};
 
 use super::{
-    LONELY, Window, export,
+    Dropped, LONELY, Window, export,
     forms::{EARLIER, with_seen},
     press, rest, type_into, with_column, with_lonely,
 };
@@ -768,6 +768,32 @@ fn the_wheel_enlarges_a_picture_and_its_reference_alike() {
     assert_eq!(pulled, reference);
     assert_eq!(window.with(|w| w.resource::<Viewpoint>().camera().cloned()), camera);
     assert!(window.harness.query_by_label("Wipe").is_some(), "the reference is gone");
+}
+
+/// Two images that are let go where no member is, and none is selected, are taken for photographs;
+/// that is said, and they may be slices of whichever member is selected then.
+#[test]
+fn images_that_are_let_go_on_no_member_may_be_its_slices() {
+    let (mut window, folder) = with_lonely();
+    window.until("a scene", |w| w.contains_resource::<CurrentScene>());
+    window.frames(3);
+    let corner = egui::pos2(2.0, 2.0);
+    window.harness.hover_at(corner);
+    for name in ["a.tif", "b.tif"] {
+        let file = folder.path().join(name);
+        image::GrayImage::from_pixel(32, 32, image::Luma([120])).save(&file).expect("a file");
+        window.harness.input_mut().dropped_files.push(Arc::new(Dropped(file)));
+    }
+    window.until_seen("If they are CT slices, select their member.");
+    assert!(has(&window, "2 files were let go on no member: b.tif is open in Photos."));
+    window.click("Photograph a.tif");
+    assert!(has(&window, "2 files were let go on no member: a.tif is open in Photos."));
+    window.ask(Action::Select(Some(0)));
+    window.until_seen("They are CT slices of Column 1");
+    window.click("They are CT slices of Column 1");
+    window.until_seen("to Column 1");
+    assert!(has(&window, "a.tif") && has(&window, "b.tif"));
+    assert!(!has(&window, "were let go on no member"));
 }
 
 /// What was framed in half of the panel, beside an earlier prediction, is seen as a whole when it has
