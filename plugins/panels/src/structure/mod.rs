@@ -97,6 +97,8 @@ pub(crate) struct Structure {
     /// Where it is cut open.
     section: Option<Section>,
     tape: Tape,
+    /// Where the slice of the CT tab lies.
+    outline: slice::SliceOutline,
     /// Where on its member the evidence is that a form asks for.
     place: Option<Vec3>,
     /// An earlier prediction is seen from where the newest is.
@@ -123,6 +125,7 @@ impl Default for Structure {
             names: true,
             section: None,
             tape: Tape::default(),
+            outline: slice::SliceOutline::default(),
             place: None,
             is_linked: true,
             parted: None,
@@ -372,8 +375,10 @@ pub(crate) fn structure(
     compass::draw(ui, rect, &pointed.camera);
     let sliced = selection.0.and_then(|member| Some((member, ct.plane(scene, member)?)));
     if let Some((member, plane)) = sliced {
-        let triangles = structure.model.triangles(member);
-        slice::draw(ui, rect, &pointed.camera, triangles, plane);
+        let Structure { model, outline, .. } = &mut *structure;
+        let model = &*model;
+        outline.follow((scene.hash.as_str(), member, plane), || model.triangles(member));
+        outline.draw(ui, rect, &pointed.camera);
     }
     structure.tape.draw(ui, rect, &pointed.camera);
     structure.place.iter().for_each(|at| measure::end(ui, rect, &pointed.camera, *at));
