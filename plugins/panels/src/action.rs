@@ -14,6 +14,7 @@ use crate::{
     Aspect, Banners, Colours, Jump, Language, Lengths, Log, Look, Quantity, Refine, Selection,
     Viewpoint, Workspace,
     attach::Form,
+    border,
     command::Palette,
     create::Creation,
     ct::Ct,
@@ -473,7 +474,7 @@ fn dismiss(world: &mut World) {
     // over the picture of light.
     let [slices, light] = ["CT", "Render"].map(|panel| world.resource::<Desk>().has_drawn(panel));
     if slices && world.resource_mut::<Ct>().end_tool()
-        || light && world.resource_mut::<LightLine>().end()
+        || light && (world.resource_mut::<LightLine>().end() || border::end(world))
     {
         return;
     }

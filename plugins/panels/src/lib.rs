@@ -7,6 +7,7 @@ mod action;
 mod album;
 mod attach;
 mod banner;
+mod border;
 mod chart;
 mod colours;
 mod command;

@@ -223,7 +223,9 @@ fn colour(tone: &Tone, radiance: Vec3) -> Color32 {
 pub(crate) fn keep(world: &mut World) {
     let Some(render) = world.get_resource::<Render>() else { return };
     let viewpoint = world.resource::<Viewpoint>();
-    let Some(camera) = viewpoint.camera().filter(|_| !viewpoint.is_preview()) else { return };
+    // Of a part there is no picture that a later one could be held against.
+    let may = !viewpoint.is_preview() && !viewpoint.is_part();
+    let Some(camera) = viewpoint.camera().filter(|_| may) else { return };
     let look = world.resource::<Look>();
     let share = world.resource::<Statistics>().share(render);
     let parts = picture::parts(render, look.view, share);

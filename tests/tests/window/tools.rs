@@ -732,6 +732,36 @@ fn one_goes_back_to_where_one_was_and_forward_again() {
     assert!(along.z < -0.9, "it is not seen from the front: {along}");
 }
 
+/// In a border that is drawn over the picture of light the same rays are followed, and no others;
+/// Esc goes on with all of the picture.
+#[test]
+fn a_border_is_refined_alone() {
+    let mut window = Window::with_scene("cornell");
+    window.until("some light", |w| w.resource::<Render>().samples_per_pixel() > 2.0);
+    let film = |window: &Window| window.with(|w| w.resource::<Render>().camera().clone());
+    let whole = film(&window);
+    let camera = window.with(|w| w.resource::<Viewpoint>().camera().cloned());
+    let rect = window.harness.get_by_label("Picture").rect();
+    let at = |x: f32, y: f32| rect.lerp_inside(egui::vec2(x, y));
+    window.click("Border");
+    // The tools may have moved the picture.
+    let rect_now = window.harness.get_by_label("Picture").rect();
+    assert_eq!(rect, rect_now);
+    draw(&mut window, at(0.25, 0.5), at(0.75, 0.75));
+    window.until("the part", |w| w.resource::<Render>().camera().width < whole.width);
+    window.until("its light", |w| w.resource::<Render>().samples_per_pixel() > 2.0);
+    let part = film(&window);
+    let share = |a: u32, b: u32| f64::from(a) / f64::from(b);
+    assert!((share(part.width, whole.width) - 0.5).abs() < 0.03, "{part:?}");
+    assert!((share(part.height, whole.height) - 0.25).abs() < 0.03, "{part:?}");
+    let middle = |c: &Camera, x: f32, y: f32| c.direction(x * c.width as f32, y * c.height as f32);
+    let (own, theirs) = (middle(&part, 0.5, 0.5), middle(&whole, 0.5, 0.625));
+    assert!(own.distance(theirs) < 0.01, "{own} {theirs}");
+    assert_eq!(window.with(|w| w.resource::<Viewpoint>().camera().cloned()), camera);
+    window.harness.key_press(Key::Escape);
+    window.until("all of it", |w| *w.resource::<Render>().camera() == whole);
+}
+
 /// The wheel enlarges a picture and its reference alike, where a camera that comes nearer would let
 /// the reference go; and what is enlarged is pulled about.
 #[test]
