@@ -177,7 +177,8 @@ fn as_one(session: &Session, args: &args::Analyze) -> Result<Outcome, Failure> {
         files.write("end_forces.csv", found.csv().as_bytes())?;
         let [bars, plates] = ["whole_bars.vtu", "whole_plates.vtu"].map(|name| files.place(name));
         let folder = files.folder().to_owned();
-        found.write_vtu(&bars, &plates).map_err(|e| not_written(&folder, e))?;
+        let written = found.write_vtu(&bars, &plates, &scene.hash);
+        written.map_err(|e| not_written(&folder, e))?;
         report.files = files.listed(LIST);
         report.whole = Some(found);
         files.finish(LIST, &report)?;
@@ -474,7 +475,8 @@ fn drawn_life(
     files: &mut Set,
 ) -> Result<(Life, Vec<SurfaceDamage>), Failure> {
     let name = &work.names[&prepared.id];
-    let mut pictures = Pictures::new(files.place(format!("{name}.pvd")), prepared.axis);
+    let series = files.place(format!("{name}.pvd"));
+    let mut pictures = Pictures::new(series, prepared.axis, &work.hash);
     let mut looking = Looking::new(prepared, Seen::default());
     let (life, _) =
         analyze(prepared, work.settings(args), &session.job, &mut (&mut pictures, &mut looking))

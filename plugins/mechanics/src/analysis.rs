@@ -549,14 +549,17 @@ pub struct Pictures {
     pub files: Vec<PathBuf>,
     /// Axis of r-θ-z stresses; none: no such stresses.
     axis: Option<[DVec3; 2]>,
+    /// Hash of the scene, or of the deck.
+    scene: String,
     error: Option<WriteError>,
 }
 
 impl Pictures {
-    /// A series at `path` (`….pvd`), its files beside it.
+    /// A series at `path` (`….pvd`), its files beside it, each with the hash of its scene.
     #[must_use]
-    pub fn new(path: PathBuf, axis: Option<[DVec3; 2]>) -> Self {
-        Self { series: Series::new(path.clone()), count: 0, files: vec![path], axis, error: None }
+    pub fn new(path: PathBuf, axis: Option<[DVec3; 2]>, scene: &str) -> Self {
+        let (series, scene) = (Series::new(path.clone()), scene.to_owned());
+        Self { series, count: 0, files: vec![path], axis, scene, error: None }
     }
 
     /// The first file that could not be written.
@@ -575,7 +578,7 @@ impl Pictures {
         points: &[[Point; 8]],
     ) -> Result<(), WriteError> {
         let mesh = &structure.model.mesh;
-        let grid = Grid::solids(mesh);
+        let grid = Grid::solids(mesh).of_scene(&self.scene);
         let mean = |value: &dyn Fn(&Point) -> f64, hex: usize| {
             points[hex].iter().map(value).sum::<f64>() / 8.0
         };

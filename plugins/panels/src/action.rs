@@ -14,6 +14,7 @@ use crate::{
     Aspect, Banners, Colours, Jump, Language, Lengths, Log, Look, Quantity, Refine, Selection,
     Viewpoint, Workspace,
     attach::Form,
+    border,
     command::Palette,
     create::Creation,
     ct::Ct,
@@ -29,6 +30,7 @@ use crate::{
     reference::{self, Reference},
     saving::{Saving, Taken},
     structure::{self, Structure},
+    trail,
     views::{self, Views},
     workspace::{self, Desk},
 };
@@ -99,6 +101,10 @@ pub enum Action {
     Jump(Jump),
     /// Go through them by itself, or stop.
     Play,
+    /// Go back to the member, the view and the tabs of before.
+    Back,
+    /// Go forward again.
+    Forward,
     /// Bring a panel to the front, by its name; it is opened where it was closed.
     Tab(&'static str),
     /// Show the picture of light, in the expert's layout; which layout structures open in stays.
@@ -119,6 +125,8 @@ pub enum Action {
     Lengths(Lengths),
     /// Show numbers in these colours.
     Colours(Colours),
+    /// See pictures that are compared from one place and equally enlarged, or each by itself.
+    Link,
     /// Fill the screen, or no more.
     Fullscreen,
     /// Close the window.
@@ -158,6 +166,8 @@ pub enum Action {
     ChooseSave,
     /// Write the window as it is seen, or one panel of it, as PNG.
     TakePicture(PathBuf, Option<String>),
+    /// Write all pictures that can be made of the scene into a folder, as PNG.
+    TakeViews(PathBuf),
     /// Put the window as it is seen on the clipboard, or one panel of it.
     CopyPicture(Option<String>),
     /// Show or hide the list of keys.
@@ -196,7 +206,10 @@ pub(crate) fn act(world: &mut World) {
     // What is said before the first frame is drawn is said in it, too.
     workspace::speak(world);
     for action in std::mem::take(&mut world.resource_mut::<Actions>().0) {
+        let travels = matches!(action, Action::Back | Action::Forward);
+        let stop = trail::here(world).filter(|_| !travels);
         carry_out(world, action);
+        stop.into_iter().for_each(|stop| trail::leave(world, stop));
     }
 }
 
@@ -219,6 +232,7 @@ fn carry_out(world: &mut World, action: Action) {
             Dialogs::open(world, Purpose::Take(name));
         }
         Action::TakePicture(path, panel) => take_picture(world, Some(path), panel),
+        Action::TakeViews(folder) => world.resource_mut::<Saving>().take_views(folder),
         Action::CopyPicture(panel) => take_picture(world, None, panel),
         Action::Open(path) => open(world, path),
         Action::MakeProject => make_project(world, None),
@@ -276,6 +290,8 @@ fn carry_out(world: &mut World, action: Action) {
         Action::Step(forward) => step(world, forward),
         Action::Jump(to) => play::jump(world, to),
         Action::Play => play::toggle(world),
+        Action::Back => trail::go(world, false),
+        Action::Forward => trail::go(world, true),
         Action::Tab(name) => show_tab(world, name),
         Action::Light => world.resource_mut::<Desk>().light(),
         Action::Panel(name, true) => show_tab(world, &name),
@@ -291,6 +307,7 @@ fn carry_out(world: &mut World, action: Action) {
         Action::Speak(language) => world.resource_mut::<Desk>().speak(language),
         Action::Lengths(lengths) => world.resource_mut::<Desk>().measure_in(lengths),
         Action::Colours(colours) => world.resource_mut::<Look>().colours = colours,
+        Action::Link => world.resource_mut::<Desk>().swap_links(),
         Action::Fullscreen => world.resource_mut::<Layout>().toggle_fullscreen(),
         Action::Quit => world.resource_mut::<Layout>().quits = true,
         Action::Slice(index) => {
@@ -457,7 +474,7 @@ fn dismiss(world: &mut World) {
     // over the picture of light.
     let [slices, light] = ["CT", "Render"].map(|panel| world.resource::<Desk>().has_drawn(panel));
     if slices && world.resource_mut::<Ct>().end_tool()
-        || light && world.resource_mut::<LightLine>().end()
+        || light && (world.resource_mut::<LightLine>().end() || border::end(world))
     {
         return;
     }

@@ -2,7 +2,7 @@
 //! and for the palette.
 
 use bevy_ecs::prelude::*;
-use egui::{Key, Modifiers, RichText, ScrollArea, TextEdit, Ui};
+use egui::{Key, Modifiers, PointerButton, RichText, ScrollArea, TextEdit, Ui};
 use intrados_light::View;
 use intrados_scene::plugin::CurrentScene;
 
@@ -30,13 +30,14 @@ pub(crate) struct Command {
 }
 
 /// What the pointer does, for the sheet of keys.
-fn gestures() -> [(String, String); 6] {
+fn gestures() -> [(String, String); 7] {
     [
         (tr!("Drag"), tr!("orbit")),
         (tr!("Shift+drag, middle or right drag"), tr!("pan")),
         (tr!("Wheel"), tr!("nearer, farther")),
         (tr!("Click"), tr!("select a member")),
         (tr!("Double-click"), tr!("look at a member")),
+        (tr!("Back and forward buttons"), tr!("to where one was, and forward again")),
         (tr!("Drag a tab"), tr!("dock a panel elsewhere")),
     ]
 }
@@ -68,6 +69,7 @@ fn command(
 fn fixed(look: &Look) -> Vec<Command> {
     const CTRL: Modifiers = Modifiers::COMMAND;
     const NONE: Modifiers = Modifiers::NONE;
+    const ALT: Modifiers = Modifiers::ALT;
     let shifted = CTRL | Modifiers::SHIFT;
     let is_error = look.quantity == Quantity::Error;
     let quantity = if is_error { Quantity::Radiance } else { Quantity::Error };
@@ -89,6 +91,7 @@ fn fixed(look: &Look) -> Vec<Command> {
             None,
             Action::Save(Taken::Picture(Some("Structure".into()))),
         ),
+        command(tr!("save all views"), "", None, Action::Save(Taken::Views)),
         command(
             tr!("copy a picture of the window"),
             "Ctrl+Shift+C",
@@ -117,6 +120,13 @@ fn fixed(look: &Look) -> Vec<Command> {
         command(tr!("lay panels out as at first"), "", None, Action::ResetLayout),
         command(tr!("next member"), "Page down", by(NONE, Key::PageDown), Action::Step(true)),
         command(tr!("previous member"), "Page up", by(NONE, Key::PageUp), Action::Step(false)),
+        command(
+            tr!("back to the member and the view of before"),
+            "Alt+Left",
+            by(ALT, Key::ArrowLeft),
+            Action::Back,
+        ),
+        command(tr!("forward again"), "Alt+Right", by(ALT, Key::ArrowRight), Action::Forward),
         command(tr!("play the lives of the members, or stop"), "P", by(NONE, Key::P), Action::Play),
         command(tr!("next equilibrium"), ".", by(NONE, Key::Period), Action::Jump(Jump::Forward)),
         command(tr!("equilibrium before"), ",", by(NONE, Key::Comma), Action::Jump(Jump::Back)),
@@ -162,6 +172,7 @@ fn fixed(look: &Look) -> Vec<Command> {
         command(tr!("light or error"), "E", by(NONE, Key::E), Action::ShowQuantity(quantity)),
         command(tr!("keep the picture as reference"), "", None, Action::KeepReference),
         command(tr!("let the reference go"), "", None, Action::LetReferenceGo),
+        command(tr!("link compared pictures, or part them"), "", None, Action::Link),
         command(tr!("go on with the prediction"), "", None, Action::Predict),
         command(tr!("compare with an earlier prediction"), "", None, Action::ChoosePrediction),
         command(tr!("reload the scene"), "", None, Action::Reload),
@@ -280,8 +291,12 @@ pub(crate) fn keys(ui: &Ui, world: &mut World) {
         Action::Show(View::Combined) if turns => Action::LookFrom(Aspect::Side),
         action => action,
     };
+    let pressed = |button| ui.input(|i| i.pointer.button_pressed(button));
+    let buttons = [(PointerButton::Extra1, Action::Back), (PointerButton::Extra2, Action::Forward)];
+    let buttons = buttons.into_iter().filter(|(button, _)| pressed(*button));
     let mut actions = world.resource_mut::<Actions>();
-    asked.into_iter().map(meant).for_each(|action| actions.ask(action));
+    let asked = asked.into_iter().map(meant).chain(buttons.map(|(_, action)| action));
+    asked.for_each(|action| actions.ask(action));
 }
 
 /// The sheet of keys.

@@ -6,7 +6,7 @@ use std::{
 };
 
 use bevy_ecs::prelude::*;
-use egui::Ui;
+use egui::{Panel as Side, Ui};
 use intrados_scene::{attach::What, plugin::CurrentScene};
 
 use crate::{
@@ -21,9 +21,27 @@ use crate::{
 /// again.
 const PATIENCE: Duration = Duration::from_millis(400);
 
-/// What was let go and waits for its place.
+/// So many photographs have a button of their own.
+const MOST: usize = 6;
+
+/// What was let go.
 #[derive(Resource, Default)]
-pub(crate) struct Drops(Option<(Vec<PathBuf>, Instant)>);
+pub(crate) struct Drops {
+    /// Waits for its place.
+    coming: Option<(Vec<PathBuf>, Instant)>,
+    /// Photographs or slices: let go on no member, they were taken for photographs.
+    doubtful: Option<Doubtful>,
+}
+
+/// What may be something else than it was taken for.
+#[derive(Clone)]
+struct Doubtful {
+    /// The scene that was open.
+    scene: PathBuf,
+    files: Vec<PathBuf>,
+    /// Which of them is shown.
+    shown: PathBuf,
+}
 
 /// Takes what was let go: evidence belongs to the member under the pointer, or else to the selected
 /// one, a photograph is placed first, a model is opened.
@@ -32,12 +50,12 @@ pub(crate) fn take(ui: &Ui, world: &mut World) {
         ui.input(|i| i.raw.dropped_files.iter().map(|f| f.path().to_owned()).collect());
     let mut drops = world.resource_mut::<Drops>();
     if !dropped.is_empty() {
-        drops.0 = Some((dropped, Instant::now()));
+        drops.coming = Some((dropped, Instant::now()));
     }
-    let Some((files, since)) = drops.0.take() else { return };
+    let Some((files, since)) = drops.coming.take() else { return };
     let at = ui.input(|i| i.pointer.latest_pos());
     if at.is_none() && since.elapsed() < PATIENCE {
-        drops.0 = Some((files, since));
+        drops.coming = Some((files, since));
         ui.ctx().request_repaint_after(Duration::from_millis(30));
         return;
     }
@@ -76,10 +94,82 @@ fn meant(world: &mut World, files: &[PathBuf], spot: Option<Spot>) -> Vec<Action
             let place = there.map(|(spot, member)| (spot.along(member.frame), spot.face(member)));
             Action::Fill(files.concat(), place)
         }
-        _ if dialog::is_photograph(last) => Action::Photograph(last.clone()),
+        slices if dialog::is_photograph(last) => {
+            let doubtful = slices.map(|files| Doubtful {
+                scene: scene.path.clone(),
+                files: files.concat(),
+                shown: last.clone(),
+            });
+            world.resource_mut::<Drops>().doubtful = doubtful;
+            Action::Photograph(last.clone())
+        }
         _ => return vec![Action::Open(last.clone())],
     };
     select.into_iter().chain([then]).collect()
+}
+
+/// Says what was made of files that were let go on no member, and offers what else they may be.
+pub(crate) fn offer(ui: &mut Ui, world: &mut World) {
+    let Some(doubtful) = world.resource::<Drops>().doubtful.clone() else { return };
+    let scene = world.get_resource::<CurrentScene>().map(|s| s.0.clone());
+    let Some(scene) = scene.filter(|scene| scene.path == doubtful.scene) else {
+        world.resource_mut::<Drops>().doubtful = None;
+        return;
+    };
+    let member = world.resource::<Selection>().0.and_then(|index| scene.members.get(index));
+    let (asked, is_done) = Side::top("dropped")
+        .show(ui, |ui| {
+            let row = ui.horizontal_wrapped(|ui| doubtful.show(ui, member.map(|m| &*m.name)));
+            row.inner
+        })
+        .inner;
+    let mut drops = world.resource_mut::<Drops>();
+    if is_done {
+        drops.doubtful = None;
+    } else if let (Some(Action::Photograph(shown)), Some(now)) = (&asked, &mut drops.doubtful) {
+        now.shown.clone_from(shown);
+    }
+    asked.into_iter().for_each(|action| world.resource_mut::<Actions>().ask(action));
+}
+
+impl Doubtful {
+    /// What is to be done instead, of a member of this name where one is selected; and whether
+    /// nothing is left to be said.
+    fn show(&self, ui: &mut Ui, member: Option<&str>) -> (Option<Action>, bool) {
+        let Self { files, shown, .. } = self;
+        let name =
+            |file: &Path| file.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let (count, is_one) = (files.len(), files.len() == 1);
+        let file = name(shown);
+        ui.label(match is_one {
+            true => tr!("{} was let go on no member: it is open in Photos.", file),
+            false => tr!("{} files were let go on no member: {} is open in Photos.", count, file),
+        });
+        let mut asked = None;
+        for other in files.iter().filter(|file| *file != shown).take(MOST) {
+            if ui.button(tr!("Photograph {}", name(other))).clicked() {
+                asked = Some(Action::Photograph(other.clone()));
+            }
+        }
+        match (member, is_one) {
+            (Some(member), _) => {
+                let said = match is_one {
+                    true => tr!("It is a CT slice of {}", member),
+                    false => tr!("They are CT slices of {}", member),
+                };
+                if ui.button(said).clicked() {
+                    return (Some(Action::Fill(files.clone(), None)), true);
+                }
+            }
+            (None, true) => {
+                ui.label(tr!("If it is a CT slice, select its member."));
+            }
+            (None, false) => {
+                ui.label(tr!("If they are CT slices, select their member."));
+            }
+        }
+        (asked, ui.button(tr!("Dismiss")).clicked())
+    }
 }
 
 /// While files hang over the window: what is under them stays in sight.

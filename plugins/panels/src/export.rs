@@ -13,9 +13,11 @@ use intrados_stage::{
     Jobs, Task,
     file::{Unfinished, file_name},
 };
+use intrados_transport::Side;
 
 use crate::{
     Action, Actions, Banners, Log, Look, Quantity,
+    album::{Drawing, Leaf},
     fields::{self, Fields, Painted},
     lang::{local, term},
     legend::{Legend, put_under},
@@ -160,6 +162,43 @@ fn save(
             })
         }
     }
+}
+
+/// Light, its error, and what is known of the fields, as pictures for files.
+pub(crate) fn leaves(ui: &Ui, render: &Render, look: &Look, fields: &Fields) -> Vec<Leaf> {
+    if render.samples_per_pixel() <= 0.0 {
+        return Vec::new();
+    }
+    let (film, share) = (Arc::new(render.clone()), render.share());
+    let [width, height] = [render.camera().width, render.camera().height].map(|n| n as usize);
+    let leaf = |(name, quantity): (&str, Quantity)| {
+        let look = Look { quantity, ..*look };
+        let painted = match quantity {
+            Quantity::Field(side) => Some(fields.painted(side)?),
+            Quantity::Radiance | Quantity::Error => None,
+        };
+        let width = painted.map_or(width, |painted| painted.image.width());
+        let draw: Drawing = match painted {
+            Some(painted) => {
+                let image = painted.image.clone();
+                Box::new(move || image)
+            }
+            None => {
+                let film = Arc::clone(&film);
+                Box::new(move || picture::pixels(&film, &look, share, None, 0..height))
+            }
+        };
+        let what = describe(render, &look, painted.map(|painted| painted.scale.range));
+        let legend = legend(&look, painted).map(|legend| legend.drawn(ui, width));
+        Some(Leaf { name: name.into(), what, legend, draw })
+    };
+    let all = [
+        ("light", Quantity::Radiance),
+        ("light-error", Quantity::Error),
+        ("field-primal", Quantity::Field(Side::Primal)),
+        ("field-dual", Quantity::Field(Side::Dual)),
+    ];
+    all.into_iter().filter_map(leaf).collect()
 }
 
 /// What goes under the picture, where it is in false colour.

@@ -46,7 +46,9 @@ use crate::{
     smooth::Smoothed,
     start,
     stress::Stress,
-    toast, views,
+    toast,
+    trail::Trail,
+    views,
     workspace::{self, Desk},
 };
 
@@ -196,6 +198,7 @@ pub fn show(ui: &mut Ui, world: &mut World) {
     let [start, sheet, form, saving, creation] = own(world);
     session::offer(ui, world);
     banner::show(ui, world);
+    drops::offer(ui, world);
     if world.contains_resource::<CurrentScene>() && !world.resource::<Layout>().start {
         panels(ui, world);
     } else {
@@ -330,6 +333,16 @@ fn menu(ui: &mut Ui, world: &mut World) {
             }
         });
         ui.menu_button(tr!("View"), |ui| {
+            let of = scene.as_ref().map(|s| s.path.clone()).unwrap_or_default();
+            let ways = world.resource::<Trail>().ways(&of).into_iter();
+            for (may, (name, keys, action)) in ways.zip([
+                (tr!("Back|way"), "Alt+Left", Action::Back),
+                (tr!("Forward|way"), "Alt+Right", Action::Forward),
+            ]) {
+                if ui.add_enabled(may, egui::Button::new(name).shortcut_text(keys)).clicked() {
+                    asked.push(action);
+                }
+            }
             for (name, keys, action) in [
                 (tr!("Fit into the picture"), "F", Action::Frame),
                 (tr!("Scene's camera"), "Home", Action::Home),
@@ -342,6 +355,14 @@ fn menu(ui: &mut Ui, world: &mut World) {
             let mut look = *world.resource::<Look>();
             ui.checkbox(&mut look.outline, tr!("Outline the selected member"));
             world.resource_mut::<Look>().set_if_neq(look);
+            let mut links = world.resource::<Desk>().links();
+            let hint = tr!(
+                "An earlier prediction is seen from where the newest is, and the next photograph or slice as enlarged as the one before"
+            );
+            let link = ui.checkbox(&mut links, tr!("Link compared pictures"));
+            if link.on_hover_text(hint).changed() {
+                asked.push(Action::Link);
+            }
             ui.separator();
             let log = ui.button(tr!("Log of this session"));
             if log.on_hover_text(tr!("All that was said, read again")).clicked() {

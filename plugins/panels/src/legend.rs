@@ -55,6 +55,17 @@ impl Legend {
         }
     }
 
+    /// Of colours that no [`FalseColour`] has: from one end to the other, numbers by their places
+    /// between, and colours of what is not among them.
+    pub(crate) fn plain(
+        bar: Vec<[u8; 3]>,
+        marks: Vec<(f32, String)>,
+        samples: Vec<([u8; 3], String)>,
+        lines: Vec<String>,
+    ) -> Self {
+        Self { bar, marks, samples, lines }
+    }
+
     /// The legend in the window's colours and font, at least so many pixels wide.
     pub(crate) fn drawn(&self, ui: &Ui, width: usize) -> ColorImage {
         let density = ui.ctx().pixels_per_point();

@@ -4,8 +4,10 @@
 mod lang;
 
 mod action;
+mod album;
 mod attach;
 mod banner;
+mod border;
 mod chart;
 mod colours;
 mod command;
@@ -56,6 +58,7 @@ mod stress;
 mod structure;
 mod surface;
 mod toast;
+mod trail;
 mod values;
 mod viewpoint;
 mod views;

@@ -9,6 +9,7 @@ use intrados_light::{
     Film, ORDERS, Render, View, luminance,
     tone::{FalseColour, Tone},
 };
+use intrados_scene::Camera;
 use intrados_transport::Side;
 use rayon::prelude::*;
 
@@ -120,6 +121,16 @@ impl Picture {
     /// The film that is shown becomes what is under the next one.
     pub(crate) fn keep_as_underlay(&mut self) {
         self.underlay = self.small.take();
+    }
+
+    /// Whether it shows a film of this camera's size.
+    pub(crate) fn is_of(&self, camera: &Camera) -> bool {
+        self.size == [camera.width as usize, camera.height as usize]
+    }
+
+    /// Takes the texture away as it is; what is developed from now on is another one.
+    pub(crate) fn lift(&mut self) -> Option<TextureHandle> {
+        std::mem::take(self).texture
     }
 
     /// Another scene: nothing of the old one may be seen.

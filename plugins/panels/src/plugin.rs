@@ -8,11 +8,11 @@ use intrados_stage::Stage;
 
 use crate::{
     Actions, AddPanel, Banners, Language, Latest, Log, Look, Place, Refine, Selection, Statistics,
-    Viewpoint, action, attach, banner, command, convergence, create, ct, dialog, directions, drops,
-    edits, export, fields, history, inspector, layout, light_line, log, members, meters, moment,
-    outline, photos, picture, place::Panels, play, prediction, recent, reference, refine, render,
-    report, saving, session, sheet, smooth, statistics, steering, stress, structure, toast,
-    viewpoint, views, workspace,
+    Viewpoint, action, attach, banner, border, command, convergence, create, ct, dialog,
+    directions, drops, edits, export, fields, history, inspector, layout, light_line, log, members,
+    meters, moment, outline, photos, picture, place::Panels, play, prediction, recent, reference,
+    refine, render, report, saving, session, sheet, smooth, statistics, steering, stress,
+    structure, toast, trail, viewpoint, views, workspace,
 };
 
 /// Adds the window's state and the built-in panels. It opens no window: whoever has one calls
@@ -78,6 +78,7 @@ impl Plugin for PanelsPlugin {
             .init_resource::<smooth::Smoothed>()
             .init_resource::<reference::Reference>()
             .init_resource::<light_line::LightLine>()
+            .init_resource::<border::Border>()
             .init_resource::<outline::Outline>()
             .init_resource::<fields::Fields>()
             .init_resource::<directions::Directions>()
@@ -97,6 +98,7 @@ impl Plugin for PanelsPlugin {
             .init_resource::<edits::Edits>()
             .init_resource::<create::Creation>()
             .init_resource::<toast::Toasts>()
+            .init_resource::<trail::Trail>()
             .init_resource::<saving::Saving>()
             .init_resource::<structure::Structure>()
             .insert_resource(desk)

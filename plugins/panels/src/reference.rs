@@ -11,7 +11,7 @@ use std::{
 
 use bevy_ecs::prelude::*;
 use egui::{
-    Button, Color32, ColorImage, CursorIcon, Pos2, Rect, Sense, TextureHandle, TextureId,
+    Button, Color32, ColorImage, CursorIcon, Pos2, Rect, Response, Sense, TextureHandle, TextureId,
     TextureOptions, Ui, UiBuilder, pos2,
 };
 use flip::Flip;
@@ -27,6 +27,7 @@ use crate::{
     number::{plus_minus, significant},
     picture::{self, BANDS},
     toast::Toasts,
+    zoom::Zoom,
 };
 
 /// Half of what is taken hold of about the divider, points.
@@ -69,6 +70,8 @@ pub(crate) struct Reference {
     shown: Shown,
     /// Where the divider is: share of the width.
     wipe: f32,
+    /// Which part of both pictures is seen.
+    zoom: Zoom,
     /// The walks and the look that are compared.
     of: Option<(u64, Look)>,
     /// What was found, band by band; as the picture, one is done a frame.
@@ -220,7 +223,9 @@ fn colour(tone: &Tone, radiance: Vec3) -> Color32 {
 pub(crate) fn keep(world: &mut World) {
     let Some(render) = world.get_resource::<Render>() else { return };
     let viewpoint = world.resource::<Viewpoint>();
-    let Some(camera) = viewpoint.camera().filter(|_| !viewpoint.is_preview()) else { return };
+    // Of a part there is no picture that a later one could be held against.
+    let may = !viewpoint.is_preview() && !viewpoint.is_part();
+    let Some(camera) = viewpoint.camera().filter(|_| may) else { return };
     let look = world.resource::<Look>();
     let share = world.resource::<Statistics>().share(render);
     let parts = picture::parts(render, look.view, share);
@@ -344,12 +349,30 @@ impl Reference {
         row.inner
     }
 
-    /// Draws what was chosen over the picture.
-    pub(crate) fn draw(&mut self, ui: &Ui, rect: Rect, look: &Look) {
+    /// Where all of both pictures would be drawn, of which a rectangle is seen.
+    pub(crate) fn place(&self, rect: Rect) -> Rect {
+        if self.is_kept() { self.zoom.place(rect, rect.size()) } else { rect }
+    }
+
+    /// The wheel enlarges both pictures alike, and what is enlarged is pulled about by `drag`;
+    /// whether the pointer means that and not the camera, with which the reference would go.
+    pub(crate) fn hand(&mut self, ui: &Ui, response: &Response, rect: Rect, drag: bool) -> bool {
+        if !self.is_kept() || drag && !self.zoom.is_near() {
+            return false;
+        }
+        if drag {
+            self.zoom.pull(response.drag_delta(), rect, rect.size());
+        }
+        self.zoom.hand(ui, response, rect, rect.size());
+        true
+    }
+
+    /// Draws what was chosen over the picture, whose place is `rect`, as far as `view` shows it.
+    pub(crate) fn draw(&mut self, ui: &Ui, [rect, view]: [Rect; 2], look: &Look) {
         let part = match self.shown {
             Shown::Picture => return,
-            Shown::Reference | Shown::Difference | Shown::Flip => rect,
-            Shown::Wipe => rect.with_max_x(self.x(rect)),
+            Shown::Reference | Shown::Difference | Shown::Flip => view,
+            Shown::Wipe => view.with_max_x(self.x(rect).min(view.right())),
         };
         let texture = match self.shown {
             Shown::Difference => self.difference(ui.ctx()),
@@ -391,12 +414,14 @@ impl Reference {
     }
 
     /// The divider, which lies above the picture and is dragged instead of it.
-    pub(crate) fn divider(&mut self, ui: &Ui, rect: Rect) {
+    pub(crate) fn divider(&mut self, ui: &Ui, [rect, view]: [Rect; 2]) {
         if !self.is_kept() || self.shown != Shown::Wipe {
             return;
         }
-        let x = self.x(rect);
-        let line = Rect::from_x_y_ranges(x - GRIP..=x + GRIP, rect.y_range());
+        // Where it lies out of sight, it is taken hold of at the rim.
+        let x = |wipe: f32| view.x_range().clamp(rect.left() + wipe * rect.width());
+        let now = x(self.wipe);
+        let line = Rect::from_x_y_ranges(now - GRIP..=now + GRIP, view.y_range());
         let response = ui.interact(line, ui.scope_id().with("divider"), Sense::drag());
         let response = response.on_hover_and_drag_cursor(CursorIcon::ResizeHorizontal);
         let (name, wipe) = (tr!("Divider of reference and picture"), f64::from(self.wipe));
@@ -407,7 +432,7 @@ impl Reference {
             self.wipe = ((at.x - rect.left()) / rect.width().max(1.0)).clamp(0.0, 1.0);
         }
         for (width, ink) in [(3.0, Color32::BLACK), (1.0, Color32::WHITE)] {
-            ui.painter().vline(self.x(rect), rect.y_range(), (width, ink));
+            ui.painter().vline(x(self.wipe), view.y_range(), (width, ink));
         }
     }
 

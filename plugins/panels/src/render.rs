@@ -12,6 +12,7 @@ use intrados_transport::Side;
 
 use crate::{
     Action, Actions, Look, Quantity, Refine, Selection, Statistics, Viewpoint,
+    border::Border,
     fields::{self, Fields},
     lang::{drag, fixed, slide, term},
     light_line::LightLine,
@@ -39,10 +40,11 @@ pub(crate) fn render(
     mut viewpoint: ResMut<Viewpoint>,
     mut picture: ResMut<Picture>,
     // A system takes no more parameters: what lies over the picture goes together.
-    (mut smoothed, mut reference, mut line): (
+    (mut smoothed, mut reference, mut line, mut border): (
         ResMut<Smoothed>,
         ResMut<Reference>,
         ResMut<LightLine>,
+        ResMut<Border>,
     ),
     mut outline: ResMut<Outline>,
     mut learning: ResMut<Learning>,
@@ -56,9 +58,11 @@ pub(crate) fn render(
     let reference = reference.bypass_change_detection();
     let line = line.bypass_change_detection();
     let smoothed = smoothed.bypass_change_detection();
-    let may_keep = render.is_some() && !viewpoint.is_preview();
+    let border = border.bypass_change_detection();
+    let may_keep = render.is_some() && !viewpoint.is_preview() && !viewpoint.is_part();
     let mut new = *look;
-    toolbar(ui, &mut new, &mut refine, (smoothed, line), may_keep, &mut actions);
+    let framing = (&mut *border, &mut viewpoint, may_keep && !reference.is_kept());
+    toolbar(ui, &mut new, &mut refine, (smoothed, line), framing, may_keep, &mut actions);
     steered(ui, &mut new, &mut learning, &fields, &mut ranges);
     look.set_if_neq(new);
     if reference.choice(ui) {
@@ -90,36 +94,62 @@ pub(crate) fn render(
         _ => tr!("Picture"),
     };
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, &name));
-    ui.painter().rect_filled(rect, 0.0, Color32::BLACK);
+    let is_light = look.quantity == Quantity::Radiance;
+    let picture = picture.bypass_change_detection();
+    if border.is_on() {
+        border.drag(ui, &response, rect, &mut viewpoint, picture);
+    }
+    // The film of a part is asked for, and not there at once.
+    let has_film = viewpoint.has_sent(render.camera());
+    let film = viewpoint.place_of_part(rect).filter(|_| has_film);
+    let tools = (&mut *line, &mut *reference, &*border);
+    hand(ui, &response, (rect, film), tools, is_light, &mut viewpoint);
+    // Of a picture that is enlarged beside its reference, a part is seen.
+    let all = if is_light { reference.place(rect) } else { rect };
+    let place = film.unwrap_or(all);
+    let painter = ui.painter().with_clip_rect(rect);
+    painter.rect_filled(rect, 0.0, Color32::BLACK);
     let whole = Rect::from_min_max(Pos2::ZERO, pos2(1.0, 1.0));
     if let Quantity::Field(side) = look.quantity {
-        field(ui, rect, side, &learning, &mut fields);
-    } else if let Some(texture) = picture.bypass_change_detection().texture(ui.ctx()) {
-        ui.painter().image(texture.id(), rect, whole, Color32::WHITE);
+        field(ui, place, side, &learning, &mut fields);
+    } else {
+        // Before a pixel has a walk, what was there is better than nothing.
+        let is_seen = !viewpoint.is_part() || render.samples_per_pixel() >= 1.0;
+        let is_there = has_film && is_seen && picture.is_of(render.camera());
+        if is_there && !viewpoint.is_part() {
+            border.forget();
+        }
+        let is_drawn = border.around(&painter, rect, is_there);
+        if let Some(texture) = picture.texture(ui.ctx()).filter(|_| is_drawn) {
+            painter.image(texture.id(), place, whole, Color32::WHITE);
+        }
     }
-    if look.quantity == Quantity::Radiance {
+    if is_light {
         // What is held against a reference is the picture as it is.
         if !reference.is_kept()
+            && !viewpoint.is_part()
             && let Some(texture) = smoothed.texture(ui.ctx())
         {
             ui.painter().image(texture, rect, whole, Color32::WHITE);
             smooth::mark(ui, rect);
         }
-        reference.draw(ui, rect, &look);
+        reference.draw(ui, [all, rect], &look);
     }
     if let Some(texture) = outline.bypass_change_detection().texture(ui.ctx()) {
-        ui.painter().image(texture.id(), rect, whole, Color32::WHITE);
+        painter.image(texture.id(), all, whole, Color32::WHITE);
     }
-    hand(ui, &response, rect, line, &mut viewpoint);
-    line.draw(&ui.painter().with_clip_rect(rect), rect);
-    if look.quantity == Quantity::Radiance {
-        reference.divider(ui, rect);
+    border.draw(&painter, rect, viewpoint.place_of_part(rect));
+    line.draw(&painter, place);
+    if is_light {
+        reference.divider(ui, [all, rect]);
     }
-    let under = response.hover_pos().map(|at| under(&lit, render.camera(), rect, at));
-    cursor.set_if_neq(Cursor(under));
+    let under = response.hover_pos().map(|at| under(&lit, render.camera(), place, at));
+    // Around a part nothing is read: what is seen there is of another film.
+    let is_read = response.hover_pos().is_some_and(|at| place.contains(at));
+    cursor.set_if_neq(Cursor(under.filter(|_| is_read)));
     if response.clicked() {
         if let Some(at) = response.interact_pointer_pos() {
-            fields.pick((at - rect.min) / rect.size());
+            fields.pick((at - place.min) / place.size());
         }
         let member = under.and_then(|u| lit.0.scene.objects.get(u.hit?.0)?.member);
         actions.ask(Action::Select(member.filter(|m| selection.0 != Some(*m))));
@@ -202,23 +232,32 @@ fn under(lit: &Lit, camera: &Camera, rect: Rect, at: Pos2) -> Under {
 }
 
 /// Drag to orbit, or to draw where the tool is out; Shift or middle or right drag to pan, wheel to
-/// come nearer.
+/// come nearer. Beside its reference the picture of light is enlarged instead.
 fn hand(
     ui: &Ui,
     response: &egui::Response,
-    rect: Rect,
-    line: &mut LightLine,
+    (rect, film): (Rect, Option<Rect>),
+    (line, reference, border): (&mut LightLine, &mut Reference, &Border),
+    is_light: bool,
     viewpoint: &mut ResMut<Viewpoint>,
 ) {
+    let frames = border.is_on() && response.dragged_by(PointerButton::Primary);
     let draws = line.is_on()
+        && !frames
         && response.dragged_by(PointerButton::Primary)
         && !ui.input(|i| i.modifiers.shift);
     if draws {
-        line.drag(ui, rect);
+        let all = if is_light { reference.place(rect) } else { rect };
+        line.drag(ui, film.unwrap_or(all));
     }
-    let held = response.dragged() && !draws;
+    let is_dragged = response.dragged() && !draws && !frames;
+    let enlarges = is_light && reference.hand(ui, response, rect, is_dragged);
+    let held = is_dragged && !enlarges;
     if viewpoint.dragged != held {
         viewpoint.dragged = held;
+    }
+    if enlarges {
+        return;
     }
     let Some(camera) = viewpoint.camera().cloned() else { return };
     let delta = response.drag_delta();
@@ -244,6 +283,7 @@ fn toolbar(
     look: &mut Look,
     refine: &mut ResMut<Refine>,
     (smoothed, line): (&mut Smoothed, &mut LightLine),
+    (border, viewpoint, may_frame): (&mut Border, &mut ResMut<Viewpoint>, bool),
     may_keep: bool,
     actions: &mut Actions,
 ) {
@@ -291,6 +331,7 @@ fn toolbar(
             actions.ask(Action::KeepReference);
         }
         line.button(ui);
+        border.button(ui, viewpoint, may_frame);
         smooth::switch(ui, smoothed);
     });
 }

@@ -18,7 +18,8 @@ use intrados_stage::{
 };
 
 use crate::{
-    Action, Actions, Banners, Latest, Log, export::write_png, lang::term, report, toast::Toasts,
+    Action, Actions, Banners, Latest, Log, album, export::write_png, lang::term, report,
+    toast::Toasts,
 };
 
 /// So long tools are put away for a picture: where the system gives none, they come back.
@@ -35,6 +36,8 @@ pub enum Taken {
     Values(&'static str, String),
     /// A panel as it is seen, with its legend; none: the whole window.
     Picture(Option<String>),
+    /// All pictures that can be made of the scene, in a folder.
+    Views,
 }
 
 /// What was written, and where to; of a report, how many files.
@@ -54,6 +57,8 @@ pub(crate) struct Saving {
     /// A picture that is to be taken of the window, once it is drawn; without a file for the
     /// clipboard.
     wanted: Option<(Option<PathBuf>, Option<Rect>)>,
+    /// The folder that all pictures of the scene are to be written into, once the frame is drawn.
+    album: Option<PathBuf>,
     /// Since when a picture is wanted.
     since: Option<Instant>,
     /// Where it comes, once it was asked for.
@@ -68,6 +73,7 @@ impl Saving {
             Taken::Report => format!("{name}-damage"),
             Taken::Table(table) | Taken::Values(table, _) => format!("{name}-{table}.csv"),
             Taken::Picture(_) => format!("{name}.png"),
+            Taken::Views => format!("{name}-views"),
         };
         self.shown = Some(what);
     }
@@ -99,6 +105,11 @@ impl Saving {
     /// or for the clipboard.
     pub(crate) fn take_picture(&mut self, path: Option<PathBuf>, of: Option<Rect>) {
         (self.wanted, self.since) = (Some((path, of)), Some(Instant::now()));
+    }
+
+    /// Writes all pictures of the scene into a folder.
+    pub(crate) fn take_views(&mut self, folder: PathBuf) {
+        self.album = Some(folder);
     }
 
     /// Whether a picture of a panel is being taken: its tools are not of it.
@@ -144,9 +155,19 @@ pub(crate) fn menu(ui: &mut Ui, has_prediction: bool, asked: &mut Vec<Action>) {
     if ui.add(light).clicked() {
         asked.push(Action::Export);
     }
+    if ui.button(tr!("All views…")).on_hover_text(of_views()).clicked() {
+        asked.push(Action::Save(Taken::Views));
+    }
     if !has_prediction {
         ui.weak(tr!("Report and tables come with the prediction."));
     }
+}
+
+/// What is in a folder of all views.
+fn of_views() -> String {
+    tr!("PNG, each with its legend: the structure from where it is looked at, its sides, the \
+         scene's cameras and the views that are kept; light, its error and its fields; the slice, \
+         the stress and the photograph that were shown last.")
 }
 
 /// The sheet.
@@ -161,6 +182,7 @@ pub(crate) fn sheet(
     let saving = saving.bypass_change_detection();
     let (Some(what), Some(scene)) = (saving.shown.clone(), scene) else { return };
     let is_report = what == Taken::Report;
+    let is_folder = is_report || what == Taken::Views;
     ui.label(match &what {
         Taken::Report => {
             tr!("HTML, BCF, tables and models, as `intrados predict --out` writes them.")
@@ -169,9 +191,10 @@ pub(crate) fn sheet(
             tr!("The table of {}: UTF-8, units in the header.", term(name))
         }
         Taken::Picture(_) => tr!("PNG, as it is seen now."),
+        Taken::Views => of_views(),
     });
     ui.horizontal(|ui| {
-        let name = if is_report { tr!("Folder to write") } else { tr!("File to write") };
+        let name = if is_folder { tr!("Folder to write") } else { tr!("File to write") };
         let label = ui.label(name);
         ui.add(TextEdit::singleline(&mut saving.path).desired_width(280.0)).labelled_by(label.id);
         if ui.button(tr!("Browse…")).clicked() {
@@ -201,6 +224,7 @@ pub(crate) fn sheet(
             let path = PathBuf::from(saving.path.trim());
             match (what, result) {
                 (Taken::Picture(panel), _) => actions.ask(Action::TakePicture(path, panel)),
+                (Taken::Views, _) => actions.ask(Action::TakeViews(path)),
                 (Taken::Table(name), Some(result)) => {
                     saving.task = Some(table(path, move || named(&result, name), &mut jobs));
                 }
@@ -285,6 +309,13 @@ pub(crate) fn picture(ui: &Ui, world: &mut World) {
                 world.resource_mut::<Toasts>().say(tr!("The picture is on the clipboard"));
                 world.resource_mut::<Log>().say(tr!("copied a picture"));
             }
+        }
+    }
+    if let Some(folder) = saving.album.take_if(|_| saving.task.is_none()) {
+        saving.task = album::begin(ui, world, folder);
+        if saving.task.is_none() {
+            let why = tr!("There is no picture yet.");
+            world.resource_mut::<Banners>().cannot(&tr!("Not saved"), &why);
         }
     }
     *world.resource_mut::<Saving>() = saving;

@@ -16,7 +16,14 @@ use intrados_scene::{
 };
 use serde::{Deserialize, Serialize};
 
-use crate::{Action, Actions, Selection, attach::Form, kept, photos::Photos, workspace::Desk};
+use crate::{
+    Action, Actions, Selection,
+    attach::Form,
+    kept,
+    photos::Photos,
+    sheet::{Properties, Unapplied},
+    workspace::Desk,
+};
 
 /// Schema of the file.
 const SCHEMA: &str = "intrados.session/1";
@@ -32,6 +39,9 @@ struct Kept {
     member: Option<String>,
     /// The form of evidence, where it is open.
     form: Option<Form>,
+    /// What has been typed into the sheet's form and is not applied.
+    #[serde(default)]
+    sheet: Option<Unapplied>,
     photograph: Option<KeptPhotograph>,
 }
 
@@ -124,6 +134,7 @@ pub(crate) fn keep(
     mut session: ResMut<Session>,
     mut selection: ResMut<Selection>,
     mut form: ResMut<Form>,
+    mut properties: ResMut<Properties>,
     mut photos: ResMut<Photos>,
     mut desk: ResMut<Desk>,
 ) {
@@ -137,6 +148,9 @@ pub(crate) fn keep(
         if let Some(left) = kept.form {
             *form = left;
         }
+        if let Some(left) = kept.sheet {
+            properties.go_on(&scene.0, left);
+        }
         if let Some(left) = kept.photograph {
             let pick = |(pixel, place): ([f64; 2], [f64; 3])| Pick { pixel, place: place.into() };
             photos.go_on(left.file, left.picks.into_iter().map(pick).collect());
@@ -145,12 +159,18 @@ pub(crate) fn keep(
         return;
     }
     if scene.0.path.exists() {
-        session.keep(of(&scene.0, *selection, &form, &photos));
+        session.keep(of(&scene.0, *selection, &form, &properties, &photos));
     }
 }
 
 /// What is open now.
-fn of(scene: &Scene, selection: Selection, form: &Form, photos: &Photos) -> Kept {
+fn of(
+    scene: &Scene,
+    selection: Selection,
+    form: &Form,
+    properties: &Properties,
+    photos: &Photos,
+) -> Kept {
     let picks =
         |picks: Vec<Pick>| picks.iter().map(|p| (p.pixel, DVec3::to_array(&p.place))).collect();
     Kept {
@@ -159,6 +179,7 @@ fn of(scene: &Scene, selection: Selection, form: &Form, photos: &Photos) -> Kept
         scene: std::path::absolute(&scene.path).unwrap_or_else(|_| scene.path.clone()),
         member: selection.0.and_then(|i| scene.members.get(i)).map(|m| m.id.clone()),
         form: form.is_open.then(|| form.clone()),
+        sheet: properties.unapplied(scene),
         photograph: photos.unsaved().map(|(file, all)| KeptPhotograph { file, picks: picks(all) }),
     }
 }
@@ -169,7 +190,7 @@ pub(crate) fn offer(ui: &mut Ui, world: &mut World) {
     Side::top("session").show(ui, |ui| {
         ui.horizontal_wrapped(|ui| {
             ui.label(tr!("The last session was not ended: {}.", left.scene.display()));
-            if left.form.is_some() || left.photograph.is_some() {
+            if left.form.is_some() || left.sheet.is_some() || left.photograph.is_some() {
                 ui.label(tr!("What was filled in there and not saved is kept."));
             }
             let session = &mut *world.resource_mut::<Session>();
@@ -196,6 +217,7 @@ mod tests {
             scene: scene.into(),
             member: Some("C1".into()),
             form: Some(form),
+            sheet: None,
             photograph: Some(KeptPhotograph {
                 file: "a.jpg".into(),
                 picks: vec![([1.5, 2.0], [0.1, 0.2, 0.3])],

@@ -2,6 +2,7 @@
 
 use egui::{Grid, RichText, ScrollArea, TextEdit, Ui};
 use intrados_scene::attach::{Field, FieldKind, Setting};
+use serde::{Deserialize, Serialize};
 
 use crate::lang::term;
 
@@ -9,6 +10,16 @@ use crate::lang::term;
 const WIDTHS: (f32, f32) = (70.0, 120.0);
 /// So many changed fields are named in the line that can be undone.
 const NAMED: usize = 3;
+
+/// What has been typed into a field and is not written yet.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct Typed {
+    /// Its place in the form, and what it is called there.
+    place: usize,
+    group: String,
+    name: String,
+    text: String,
+}
 
 /// Fields, and what has been typed into each.
 #[derive(Debug, Default)]
@@ -35,6 +46,30 @@ impl Values {
     /// How many are not as they are written.
     pub(crate) fn changed(&self) -> usize {
         self.pairs().count()
+    }
+
+    /// What has been typed and is not written yet.
+    pub(crate) fn typed(&self) -> Vec<Typed> {
+        let all = self.fields.iter().zip(&self.texts).enumerate();
+        all.filter(|(_, (field, text))| field.value != text.trim())
+            .map(|(place, (field, text))| Typed {
+                place,
+                group: field.group.clone(),
+                name: field.name.clone(),
+                text: text.clone(),
+            })
+            .collect()
+    }
+
+    /// Types it again, into the same fields as far as they are still there.
+    pub(crate) fn type_again(&mut self, typed: &[Typed]) {
+        for Typed { place, group, name, text } in typed {
+            let field = self.fields.get(*place);
+            let is_same = field.is_some_and(|f| (&f.group, &f.name) == (group, name));
+            if let Some(own) = self.texts.get_mut(*place).filter(|_| is_same) {
+                own.clone_from(text);
+            }
+        }
     }
 
     fn pairs(&self) -> impl Iterator<Item = (&Field, &String)> {
@@ -125,4 +160,28 @@ fn choose(ui: &mut Ui, of: &str, names: &[String], text: &mut String) {
     });
     let hint = tr!("Choose {}", term(of));
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, &hint));
+}
+
+#[cfg(test)]
+mod tests {
+    use intrados_scene::{Scene, attach::fields};
+    use intrados_stage::Job;
+
+    use super::*;
+
+    #[test]
+    fn what_was_typed_goes_into_the_same_fields_again_and_into_no_others() {
+        let scene = Scene::load_bundled("column", &Job::default()).unwrap();
+        let all = fields(&scene, scene.members.first());
+        let mut values = Values::new(all.clone());
+        values.texts[1].push('7');
+        let typed = values.typed();
+        assert_eq!(typed.len(), 1);
+        let mut again = Values::new(all);
+        again.type_again(&typed);
+        assert_eq!((again.changed(), &again.texts), (1, &values.texts));
+        let mut other = Values::new(fields(&scene, None));
+        other.type_again(&typed);
+        assert_eq!(other.changed(), 0);
+    }
 }

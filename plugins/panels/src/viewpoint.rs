@@ -1,13 +1,14 @@
 //! The camera that the user moves, and how large a film it gets.
 
 use bevy_ecs::prelude::*;
+use egui::{Rect, vec2};
 use intrados_light::{
     Render, RenderSettings, Sides, View,
     plugin::{ActiveCamera, Lit},
 };
 use intrados_scene::Camera;
 
-use crate::{Look, Refine, orbit, picture::Picture};
+use crate::{Look, Refine, border::Border, orbit, picture::Picture};
 
 /// Largest film in the window, pixels.
 const FULL: u32 = 1 << 20;
@@ -34,6 +35,11 @@ pub struct Viewpoint {
     awaits: bool,
     /// What this plugin last asked for.
     sent: Option<Camera>,
+    /// The part of the large film that alone is refined: its first column and row, and the first
+    /// ones behind it.
+    part: Option<[[u32; 2]; 2]>,
+    /// Whether it is another one than in the last frame.
+    is_cut: bool,
 }
 
 impl Viewpoint {
@@ -47,6 +53,46 @@ impl Viewpoint {
     pub fn go(&mut self, camera: Camera) {
         self.camera = Some(camera);
         self.moved = true;
+        (self.part, self.is_cut) = (None, false);
+    }
+
+    /// Refines only these pixels of the large film from now on, until the camera moves.
+    pub(crate) fn refine_only(&mut self, part: [[u32; 2]; 2]) {
+        (self.part, self.is_cut) = (Some(part), true);
+    }
+
+    /// Refines all of the picture again: it begins anew. False if it is all refined.
+    pub(crate) fn refine_all(&mut self) -> bool {
+        let camera = self.camera.clone().filter(|_| self.part.is_some());
+        let was_part = camera.is_some();
+        camera.into_iter().for_each(|camera| self.go(camera));
+        was_part
+    }
+
+    /// Whether a part of the picture alone is refined.
+    pub(crate) fn is_part(&self) -> bool {
+        self.part.is_some()
+    }
+
+    /// Whether a film of this camera is what was asked for last.
+    pub(crate) fn has_sent(&self, camera: &Camera) -> bool {
+        !self.moved && !self.is_cut && self.sent.as_ref() == Some(camera)
+    }
+
+    /// Pixels of the large film, across and down.
+    pub(crate) fn pixels(&self) -> Option<[u32; 2]> {
+        let large = orbit::resized(self.camera.as_ref()?, FULL);
+        Some([large.width, large.height])
+    }
+
+    /// Where the part that alone is refined lies in a picture in `rect`.
+    pub(crate) fn place_of_part(&self, rect: Rect) -> Option<Rect> {
+        let (ends, size) = (self.part?, self.pixels()?);
+        let place = |[x, y]: [u32; 2]| {
+            rect.lerp_inside(vec2(x as f32 / size[0] as f32, y as f32 / size[1] as f32))
+        };
+        let [from, to] = ends.map(place);
+        Some(Rect::from_min_max(from, to))
     }
 
     /// Whether the film is the small one for the moment.
@@ -70,11 +116,15 @@ pub(crate) fn adopt(
     mut viewpoint: ResMut<Viewpoint>,
     mut look: ResMut<Look>,
     mut picture: ResMut<Picture>,
+    mut border: ResMut<Border>,
 ) {
     let (Some(lit), Some(active)) = (lit, active) else { return };
     if viewpoint.awaits && render.is_some_and(|r| Some(r.camera()) == viewpoint.sent.as_ref()) {
         viewpoint.awaits = false;
-        picture.keep_as_underlay();
+        // Under a part there is no small film of its own.
+        if !viewpoint.is_part() {
+            picture.keep_as_underlay();
+        }
     }
     if !active.is_changed() || viewpoint.sent.as_ref() == Some(&active.0) && !lit.is_changed() {
         return;
@@ -84,6 +134,7 @@ pub(crate) fn adopt(
         look.exposure = active.0.exposure;
         look.order = None;
         picture.forget();
+        border.forget();
     }
     viewpoint.go(active.0.clone());
 }
@@ -98,6 +149,12 @@ pub(crate) fn steer(
     mut refine: ResMut<Refine>,
 ) {
     let (Some(mut active), Some(camera)) = (active, viewpoint.camera.clone()) else { return };
+    if let Some([from, to]) = viewpoint.part.filter(|_| viewpoint.is_cut) {
+        (viewpoint.is_cut, viewpoint.awaits) = (false, true);
+        refine.paused = false;
+        viewpoint.send(&mut active, orbit::resized(&camera, FULL).cropped(from, to));
+        return;
+    }
     if std::mem::take(&mut viewpoint.moved) {
         viewpoint.awaits = false;
         refine.paused = false;

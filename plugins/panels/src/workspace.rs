@@ -92,6 +92,9 @@ struct Kept {
     colours: Colours,
     #[serde(default)]
     ranges: Ranges,
+    /// Pictures that are compared have each their own place and size.
+    #[serde(default)]
+    unlinked: bool,
     inspector: Option<KeptLayout>,
     expert: Option<KeptLayout>,
 }
@@ -245,6 +248,8 @@ pub(crate) struct Desk {
     lengths: Lengths,
     /// How numbers become colours.
     scales: (Colours, Ranges),
+    /// Pictures that are compared have each their own place and size.
+    unlinked: bool,
     /// Whether the theme has been put on.
     is_dressed: bool,
     is_changed: bool,
@@ -255,6 +260,7 @@ impl Desk {
     pub(crate) fn read(file: Option<PathBuf>) -> Self {
         let kept: Option<Kept> = file.as_deref().and_then(kept::read);
         let kept = kept.filter(|k| k.schema == SCHEMA);
+        let unlinked = kept.as_ref().is_some_and(|k| k.unlinked);
         let (chosen, theme, words, scales, laid) = kept.map_or_else(Default::default, |k| {
             let of = |kept: Option<KeptLayout>, workspace| Laid::of(kept?, workspace);
             let expert = of(k.expert, Workspace::Expert);
@@ -263,7 +269,8 @@ impl Desk {
             (k.chosen, k.theme.into(), words, (k.colours, k.ranges), laid)
         });
         let (shown, (language, lengths)) = (chosen, words);
-        Self { chosen, shown, theme, language, lengths, scales, laid, file, ..Self::default() }
+        let words = Self { language, lengths, scales, unlinked, ..Self::default() };
+        Self { chosen, shown, theme, laid, file, ..words }
     }
 
     fn write(&self) {
@@ -273,8 +280,19 @@ impl Desk {
         let (schema, chosen, theme) = (SCHEMA.into(), self.chosen, self.theme.into());
         let (language, lengths) = (self.language, self.lengths);
         let (colours, ranges) = self.scales.clone();
-        let kept =
-            Kept { schema, chosen, theme, language, lengths, colours, ranges, inspector, expert };
+        let unlinked = self.unlinked;
+        let kept = Kept {
+            schema,
+            chosen,
+            theme,
+            language,
+            lengths,
+            colours,
+            ranges,
+            unlinked,
+            inspector,
+            expert,
+        };
         kept::write(file, "the layout was", &kept);
     }
 
@@ -327,6 +345,16 @@ impl Desk {
         self.lengths
     }
 
+    /// Whether pictures that are compared are seen from one place, and equally enlarged.
+    pub(crate) fn links(&self) -> bool {
+        !self.unlinked
+    }
+
+    /// Links pictures that are compared, or lets each go its own way.
+    pub(crate) fn swap_links(&mut self) {
+        (self.unlinked, self.is_changed) = (!self.unlinked, true);
+    }
+
     /// How numbers became colours when that was last kept.
     pub(crate) fn scales(&self) -> (Colours, Ranges) {
         self.scales.clone()
@@ -353,6 +381,16 @@ impl Desk {
     /// Whether a panel was seen in the last frame.
     pub(crate) fn has_drawn(&self, name: &str) -> bool {
         self.drawn.contains_key(name)
+    }
+
+    /// Panels that were seen in the last frame.
+    pub(crate) fn in_sight(&self) -> Vec<String> {
+        self.drawn.keys().cloned().collect()
+    }
+
+    /// Whether a panel is to be brought to the front that was not seen in the last frame.
+    pub(crate) fn is_turning(&self) -> bool {
+        self.wanted.iter().any(|name| !self.drawn.contains_key(name))
     }
 
     /// Where a panel was in the last frame.
@@ -718,6 +756,21 @@ mod tests {
         assert_ne!(without, text);
         std::fs::write(&file, without).unwrap();
         assert_eq!(Desk::read(Some(file)).lengths(), Lengths::Metres);
+    }
+
+    #[test]
+    fn pictures_are_linked_until_somebody_parts_them_and_that_is_kept() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("layout.json");
+        let mut desk = Desk::read(Some(file.clone()));
+        assert!(desk.links());
+        desk.write();
+        let text = std::fs::read_to_string(&file).unwrap();
+        std::fs::write(&file, text.replace("  \"unlinked\": false,\n", "")).unwrap();
+        assert!(Desk::read(Some(file.clone())).links());
+        desk.swap_links();
+        desk.write();
+        assert!(!Desk::read(Some(file)).links());
     }
 
     #[test]

@@ -21,6 +21,11 @@ impl Default for Zoom {
 }
 
 impl Zoom {
+    /// Whether not all of the picture is seen.
+    pub(crate) fn is_near(&self) -> bool {
+        self.times > 1.0
+    }
+
     /// Goes to a place (pixels) where not all of the picture is seen.
     pub(crate) fn reveal(&mut self, at: [f32; 2], size: [f32; 2]) {
         if self.times > 1.05 {
@@ -70,5 +75,28 @@ impl Zoom {
             *self = Self::default();
         }
         self.hold();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use egui::pos2;
+
+    use super::*;
+
+    #[test]
+    fn what_is_enlarged_is_pulled_along_and_never_out_of_sight() {
+        let rect = Rect::from_min_max(pos2(10.0, 20.0), pos2(110.0, 70.0));
+        let mut zoom = Zoom::default();
+        assert!(!zoom.is_near() && zoom.place(rect, rect.size()) == rect);
+        zoom.pull(vec2(30.0, 0.0), rect, rect.size());
+        assert_eq!(zoom, Zoom::default(), "all of it is seen already");
+        zoom.times = 4.0;
+        zoom.pull(vec2(30.0, 0.0), rect, rect.size());
+        let place = zoom.place(rect, rect.size());
+        assert!(zoom.is_near() && (place.width() - 400.0).abs() < 1e-3);
+        assert!((place.center().x - rect.center().x - 30.0).abs() < 1e-3, "{place}");
+        zoom.pull(vec2(9e3, 9e3), rect, rect.size());
+        assert!((zoom.place(rect, rect.size()).min - rect.min).length() < 1e-3);
     }
 }

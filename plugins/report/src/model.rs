@@ -64,6 +64,7 @@ pub(super) fn write(
         fields.push(field("true_damage_1", &truths));
     }
     Grid::triangles(&points, &triangles, &regions)
+        .of_scene(&scene.hash)
         .write(&files.place(vtu), &[], &fields)
         .map_err(|e| WriteError { path: files.folder().join(vtu), source: e.source })
 }

@@ -80,6 +80,7 @@ fn salt_without_numbers_is_assumed_with_its_spread() {
             && read("members.csv").contains("assumed by exposure class")
     );
     assert!(read("damage.vtu").contains("measured"));
+    assert!(read("damage.vtu").contains(&format!("scene hash {}", scene.hash)));
     let json: serde_json::Value = serde_json::from_str(&read("predict.json")).unwrap();
     let p = json["members"][0]["state_probability"].as_object().unwrap();
     assert!(

@@ -1,6 +1,7 @@
 //! Files to [`Scene`]s.
 
 use std::{
+    ffi::OsStr,
     fs::File,
     io::Read,
     path::{Path, PathBuf},
@@ -237,7 +238,7 @@ impl Scene {
     fn load_from(path: &Path, mut sources: Sources, job: &Job) -> Result<Self, LoadError> {
         let extension =
             path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
-        let name = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
+        let name = called(path);
         let mut scene = match extension.as_str() {
             "glb" | "gltf" => file::bare_model(path, &mut sources, job)?,
             "ron" => {
@@ -318,6 +319,22 @@ impl Scene {
 
 /// The scene of a project's folder.
 pub(crate) const PROJECT: &str = "scene.ron";
+
+/// What people call a scene: as its file, or as its folder where the file is called as every
+/// project's is.
+fn called(path: &Path) -> String {
+    let said = |part: &OsStr| part.to_string_lossy().into_owned();
+    let stem = path.file_stem().unwrap_or_default();
+    if Some(stem) != Path::new(PROJECT).file_stem() {
+        return said(stem);
+    }
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    let folder = folder.unwrap_or(Path::new("."));
+    // “.” and “..” have no name of their own.
+    let named = folder.file_name().map(said);
+    let found = || folder.canonicalize().ok()?.file_name().map(said);
+    named.or_else(found).unwrap_or_else(|| said(stem))
+}
 
 /// Everything that is wrong with a scene or a glTF file, errors and warnings. Empty: all is well.
 ///

@@ -10,7 +10,7 @@ use crate::{Camera, Lamp, Material, Member, Mesh, Meter, Structure, Texture};
 /// in [`CurrentScene`](crate::plugin::CurrentScene) and spreads it over entities.
 #[derive(Debug, Clone, Default)]
 pub struct Scene {
-    /// Name, for people: the file's stem.
+    /// Name, for people: the file's stem; of a `scene.ron`, which all projects have, its folder's.
     pub name: String,
     /// Title in the scene file, for people.
     pub title: String,

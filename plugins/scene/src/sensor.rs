@@ -146,6 +146,27 @@ impl Camera {
         ])
     }
 
+    /// The same view of some of its pixels alone: columns and rows from those of `from` to before
+    /// those of `to`. Each shows what it shows here, since the optical axis of a lens need not meet
+    /// the middle.
+    #[must_use]
+    pub fn cropped(&self, from: [u32; 2], to: [u32; 2]) -> Self {
+        let [width, height] = [0, 1].map(|k: usize| to[k].saturating_sub(from[k]).max(1));
+        let lens = self.lens.unwrap_or_default();
+        let whole = f64::from(self.width.max(1));
+        let share = f64::from(width) / whole;
+        let sides = [self.width, self.height].map(f64::from);
+        // From the middle of the part to the axis, in widths of the part.
+        let centre = [0, 1].map(|k: usize| {
+            let middle = f64::from(from[k]) + 0.5 * f64::from([width, height][k]);
+            let off = f64::from(lens.centre[k]) + (0.5 * sides[k] - middle) / whole;
+            (off / share) as f32
+        });
+        let half = (0.5 * f64::from(self.fov_deg).to_radians()).tan();
+        let fov_deg = 2.0 * (share * half).atan().to_degrees() as f32;
+        Self { fov_deg, width, height, lens: Some(Lens { centre, ..lens }), ..self.clone() }
+    }
+
     /// Whether the lens draws something everywhere in the picture. What it draws is convex enough
     /// for its edges to tell: a sample of them does.
     #[must_use]
@@ -229,6 +250,22 @@ mod tests {
                 assert!(off < 2e-3, "{at:?}: {x} {y}");
             }
             assert_eq!(camera.project((camera.position - camera.frame()[2]).as_dvec3()), None);
+        }
+    }
+
+    /// With a lens and without: a pixel of a part shows what it shows in the whole.
+    #[test]
+    fn a_part_of_a_picture_has_the_rays_of_the_whole() {
+        let lens = Lens { k1: -0.12, k2: 0.03, p1: 0.001, p2: -0.002, centre: [0.01, -0.02] };
+        for lens in [None, Some(lens)] {
+            let whole = Camera { lens, fov_deg: 70.0, ..Camera::overview([Vec3::ZERO, Vec3::ONE]) };
+            let part = whole.cropped([700, 40], [900, 360]);
+            assert_eq!((part.width, part.height), (200, 320));
+            for (x, y) in [(0.0, 0.0), (199.5, 0.5), (60.0, 319.0), (200.0, 320.0)] {
+                let (own, theirs) = (part.direction(x, y), whole.direction(700.0 + x, 40.0 + y));
+                // A pixel is 1.5e-3 wide.
+                assert!(own.distance(theirs) < 1e-5, "{x} {y}: {own} {theirs}");
+            }
         }
     }
 

@@ -329,6 +329,25 @@ fn what_is_missing_is_missing_and_what_is_wrong_is_wrong() {
     assert!(Scene::load(&binary, &Job::default()).unwrap_err().to_string().contains("UTF-8"));
 }
 
+/// Every project's file is called `scene.ron`: it is the folder that tells them apart.
+#[test]
+fn a_project_is_called_as_its_folder_and_any_other_scene_as_its_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let bridge = folder.path().join("Bridge 7.2");
+    std::fs::create_dir(&bridge).unwrap();
+    let called = |path: &Path| Scene::open(path, &Job::default()).unwrap().name;
+    for name in ["scene.ron", "pier.ron"] {
+        let body = "shapes: [Box(centre: (0, 0, 0), size: (1, 1, 1))],";
+        std::fs::write(bridge.join(name), scene_of(body)).unwrap();
+    }
+    assert_eq!(called(&bridge), "Bridge 7.2");
+    assert_eq!(called(&bridge.join("scene.ron")), "Bridge 7.2");
+    assert_eq!(called(&bridge.join("./scene.ron")), "Bridge 7.2");
+    std::fs::create_dir(bridge.join("photos")).unwrap();
+    assert_eq!(called(&bridge.join("photos/../scene.ron")), "Bridge 7.2");
+    assert_eq!(called(&bridge.join("pier.ron")), "pier");
+}
+
 #[test]
 fn a_cancelled_load_stops() {
     let job = Job::default();

@@ -183,7 +183,7 @@ impl Window {
 }
 
 /// What `intrados predict` wrote a year ago.
-const EARLIER: &str = r#"{"schema": "intrados.predict/2", "scene": "lonely", "members": [
+pub(super) const EARLIER: &str = r#"{"schema": "intrados.predict/2", "scene": "lonely", "members": [
     {"id": "C1", "name": "Column 1", "damage": 0.02, "damage_std_error": 0.01, "state": "sound",
      "zones": [{"value": 0.02, "std_error": 0.01}, null, null, null, null, null, null, null, null, null]}]}"#;
 

@@ -63,6 +63,7 @@ fn all_said(language: Language) -> BTreeSet<String> {
         Action::Palette,
         Action::New,
         Action::Save(Taken::Report),
+        Action::Save(Taken::Views),
         Action::Fill(Vec::new(), None),
         Action::Export,
     ] {

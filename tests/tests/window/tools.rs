@@ -1,22 +1,27 @@
 //! Tools of the structure's picture and of the sheet, and what is left of a session that broke off.
 
-use std::{collections::HashSet, fs, path::Path};
+use std::{collections::HashSet, fs, path::Path, sync::Arc};
 
 use bevy_ecs::world::World;
-use egui::{Key, Modifiers};
+use egui::{Event, Key, Modifiers, MouseWheelSource, MouseWheelUnit, TouchPhase, accesskit::Role};
 use egui_kittest::kittest::{NodeT, Queryable};
 use glam::{Mat4, Vec3};
 use intrados_forecast::ForecastSettings;
 use intrados_light::Render;
 use intrados_mechanics::plugin::{Analyses, ShownAt};
 use intrados_panels::{
-    Action, Latest, Lengths, Log, Look, PanelsPlugin, Refine, Selection, Viewpoint, Workspace,
+    Action, Latest, Lengths, Log, Look, PanelsPlugin, Refine, Selection, Taken, Viewpoint,
+    Workspace,
 };
 use intrados_predict::{PredictSettings, Predicting};
 use intrados_scene::{Camera, Part, Scene, parametric::write_glb, plugin::CurrentScene};
 use intrados_stage::{Job, Jobs, Task, Work};
 
-use super::{LONELY, Window, export, press, rest, type_into, with_column, with_lonely};
+use super::{
+    Dropped, LONELY, Window, export,
+    forms::{EARLIER, with_seen},
+    press, rest, type_into, with_column, with_lonely,
+};
 
 /// Whether anything in the window has this text in its name.
 fn has(window: &Window, text: &str) -> bool {
@@ -91,6 +96,43 @@ fn tools_are_put_away_for_a_picture_of_the_structure() {
     window.frame();
     assert!(window.harness.query_by_label("As it looks").is_none());
     assert!(window.harness.query_by_label("Damage of members").is_some());
+}
+
+/// All views of a structure, its slice among them, become files whose names say what they show.
+#[test]
+fn all_views_are_saved_into_a_folder() {
+    let mut window = with_column();
+    window.until("a camera", |w| w.resource::<Viewpoint>().camera().is_some());
+    window.ask(Action::KeepView("from the river".into()));
+    window.ask(Action::Select(Some(1)));
+    window.ask(Action::Tab("CT"));
+    window.until_seen("CT slice");
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("views");
+    window.ask(Action::Save(Taken::Views));
+    window.frames(3);
+    type_into(&mut window, "Folder to write", &out.display().to_string());
+    window.harness.get_by_role_and_label(Role::Button, "Save").click();
+    window.until("the pictures", |w| {
+        w.resource::<Log>().lines().iter().any(|line| line.contains(" files into "))
+    });
+    let picture = |name: &str| {
+        let file = out.join(format!("{name}.png"));
+        image::open(&file).unwrap_or_else(|why| panic!("{name}: {why}")).into_rgb8()
+    };
+    let [front, side, above] =
+        ["front", "side", "top"].map(|name| picture(&format!("structure-{name}")));
+    assert!(front != side && side != above);
+    picture("structure");
+    picture("structure-view-from_the_river");
+    let camera = window.with(|w| w.resource::<CurrentScene>().0.cameras[0].name.clone());
+    picture(&format!("structure-camera-{camera}"));
+    let files: Vec<String> = fs::read_dir(&out)
+        .expect("the folder")
+        .map(|entry| entry.expect("a file").file_name().to_string_lossy().into_owned())
+        .collect();
+    let slice = files.iter().find(|name| name.starts_with("ct-") && name.contains("slice_1"));
+    assert!(slice.is_some(), "{files:?}");
 }
 
 /// A digit is a side of the structure, but an estimator where the picture of light is seen; the
@@ -411,14 +453,49 @@ fn interrupted(scene: &Path, file: &Path) -> Vec<u8> {
     window.click("Attach evidence…");
     window.until_seen("Fill in its width, mm.");
     type_into(&mut window, "width, mm", "0.45");
+    left(window, file, "\"0.45\"")
+}
+
+/// Closes the window; gives what was kept of it until then, once that has this text in it.
+fn left(mut window: Window, file: &Path, text: &str) -> Vec<u8> {
     let mut kept = Vec::new();
     window.until("the session is kept", |_| {
         kept = fs::read(file).unwrap_or_default();
-        String::from_utf8_lossy(&kept).contains("\"0.45\"")
+        String::from_utf8_lossy(&kept).contains(text)
     });
     drop(window);
     assert!(!file.exists(), "a session that was ended leaves nothing behind");
     kept
+}
+
+/// What was typed into a member's sheet and not applied is offered as well, and then it stands in
+/// the form again; the scene's file has none of it.
+#[test]
+fn what_was_typed_into_a_sheet_before_a_crash_is_there_again() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scene = folder.path().join("lonely.ron");
+    fs::write(&scene, LONELY).expect("written");
+    let file = folder.path().join("state/session.json");
+    let mut window = keeping(&file);
+    window.ask(Action::Open(scene.clone()));
+    window.until("a scene", |w| w.contains_resource::<CurrentScene>());
+    window.ask(Action::Select(Some(0)));
+    window.frames(2);
+    window.click("Concrete, size, bars, loads");
+    window.until_seen("Apply");
+    window.frames(20);
+    type_into(&mut window, "width", "0.55");
+    let kept = left(window, &file, "\"0.55\"");
+    fs::write(&file, kept).expect("written");
+    let mut window = keeping(&file);
+    window.frames(2);
+    assert!(has(&window, "not saved is kept"));
+    window.click("Go on with it");
+    window.until_seen("width");
+    let typed = window.harness.get_by_label("width").accesskit_node().value();
+    assert_eq!(typed.as_deref(), Some("0.55"));
+    assert!(has(&window, "one value changed"));
+    assert_eq!(fs::read_to_string(&scene).expect("the scene"), LONELY);
 }
 
 fn keeping(file: &Path) -> Window {
@@ -618,6 +695,201 @@ fn a_picture_is_held_against_its_reference() {
     assert!(window.harness.query_by_label("Wipe").is_none(), "it is kept for another camera");
     let said = |w: &mut World| w.resource::<Log>().lines().iter().any(|l| l.contains("is let go"));
     assert!(window.with(said));
+}
+
+/// Alt and an arrow go back through members, sides and tabs, and forward again, as in a browser.
+#[test]
+fn one_goes_back_to_where_one_was_and_forward_again() {
+    let mut window = with_column();
+    window.until("a camera", |w| w.resource::<Viewpoint>().camera().is_some());
+    let go = |window: &mut Window, key: Key| {
+        window.harness.key_press_modifiers(Modifiers::ALT, key);
+        window.frames(4);
+    };
+    let selected = |window: &Window| window.with(|w| w.resource::<Selection>().0);
+    window.ask(Action::Select(Some(0)));
+    window.frames(2);
+    window.ask(Action::Select(Some(1)));
+    window.frames(2);
+    window.ask(Action::Tab("CT"));
+    window.until_seen("CT slice");
+    go(&mut window, Key::ArrowLeft);
+    assert!(has(&window, "Damage of members"), "the tab of before");
+    assert_eq!(selected(&window), Some(1));
+    go(&mut window, Key::ArrowLeft);
+    assert_eq!(selected(&window), Some(0));
+    go(&mut window, Key::ArrowRight);
+    assert_eq!(selected(&window), Some(1));
+    window.harness.key_press(Key::Num1);
+    window.frames(3);
+    window.harness.key_press(Key::Num7);
+    window.frames(3);
+    go(&mut window, Key::ArrowLeft);
+    window.ask(Action::KeepView(String::new()));
+    window.frames(2);
+    let front = view(&mut window, 0);
+    let along = (front.target - front.position).normalize();
+    assert!(along.z < -0.9, "it is not seen from the front: {along}");
+}
+
+/// In a border that is drawn over the picture of light the same rays are followed, and no others;
+/// Esc goes on with all of the picture.
+#[test]
+fn a_border_is_refined_alone() {
+    let mut window = Window::with_scene("cornell");
+    window.until("some light", |w| w.resource::<Render>().samples_per_pixel() > 2.0);
+    let film = |window: &Window| window.with(|w| w.resource::<Render>().camera().clone());
+    let whole = film(&window);
+    let camera = window.with(|w| w.resource::<Viewpoint>().camera().cloned());
+    let rect = window.harness.get_by_label("Picture").rect();
+    let at = |x: f32, y: f32| rect.lerp_inside(egui::vec2(x, y));
+    window.click("Border");
+    // The tools may have moved the picture.
+    let rect_now = window.harness.get_by_label("Picture").rect();
+    assert_eq!(rect, rect_now);
+    draw(&mut window, at(0.25, 0.5), at(0.75, 0.75));
+    window.until("the part", |w| w.resource::<Render>().camera().width < whole.width);
+    window.until("its light", |w| w.resource::<Render>().samples_per_pixel() > 2.0);
+    let part = film(&window);
+    let share = |a: u32, b: u32| f64::from(a) / f64::from(b);
+    assert!((share(part.width, whole.width) - 0.5).abs() < 0.03, "{part:?}");
+    assert!((share(part.height, whole.height) - 0.25).abs() < 0.03, "{part:?}");
+    let middle = |c: &Camera, x: f32, y: f32| c.direction(x * c.width as f32, y * c.height as f32);
+    let (own, theirs) = (middle(&part, 0.5, 0.5), middle(&whole, 0.5, 0.625));
+    assert!(own.distance(theirs) < 0.01, "{own} {theirs}");
+    assert_eq!(window.with(|w| w.resource::<Viewpoint>().camera().cloned()), camera);
+    window.harness.key_press(Key::Escape);
+    window.until("all of it", |w| *w.resource::<Render>().camera() == whole);
+}
+
+/// The wheel enlarges a picture and its reference alike, where a camera that comes nearer would let
+/// the reference go; and what is enlarged is pulled about.
+#[test]
+fn the_wheel_enlarges_a_picture_and_its_reference_alike() {
+    let mut window = Window::with_scene("cornell");
+    window.until("some light", |w| w.resource::<Render>().samples_per_pixel() > 4.0);
+    window.click("⏸ Pause");
+    window.click("Keep as reference");
+    window.frames(20);
+    let rect = window.harness.get_by_label("Picture").rect();
+    let camera = window.with(|w| w.resource::<Viewpoint>().camera().cloned());
+    let seen = |window: &mut Window, shown: &str| {
+        window.click(shown);
+        window.frames(3);
+        columns(&window.picture(), rect)
+    };
+    let whole = seen(&mut window, "This picture");
+    let at = rect.lerp_inside(egui::vec2(0.3, 0.6));
+    window.harness.event(Event::PointerMoved(at));
+    window.harness.event(Event::MouseWheel {
+        unit: MouseWheelUnit::Point,
+        delta: egui::vec2(0.0, 240.0),
+        phase: TouchPhase::Move,
+        source: MouseWheelSource::Unknown,
+        modifiers: Modifiers::NONE,
+    });
+    window.frames(40);
+    let [own, reference] = ["This picture", "Reference"].map(|shown| seen(&mut window, shown));
+    assert_ne!(own, whole, "nothing is enlarged");
+    assert_eq!(own, reference);
+    draw(&mut window, rect.center(), rect.center() + egui::vec2(40.0, 0.0));
+    let [pulled, reference] = ["This picture", "Reference"].map(|shown| seen(&mut window, shown));
+    assert_ne!(pulled, own, "nothing is pulled");
+    assert_eq!(pulled, reference);
+    assert_eq!(window.with(|w| w.resource::<Viewpoint>().camera().cloned()), camera);
+    assert!(window.harness.query_by_label("Wipe").is_some(), "the reference is gone");
+}
+
+/// Two images that are let go where no member is, and none is selected, are taken for photographs;
+/// that is said, and they may be slices of whichever member is selected then.
+#[test]
+fn images_that_are_let_go_on_no_member_may_be_its_slices() {
+    let (mut window, folder) = with_lonely();
+    window.until("a scene", |w| w.contains_resource::<CurrentScene>());
+    window.frames(3);
+    let corner = egui::pos2(2.0, 2.0);
+    window.harness.hover_at(corner);
+    for name in ["a.tif", "b.tif"] {
+        let file = folder.path().join(name);
+        image::GrayImage::from_pixel(32, 32, image::Luma([120])).save(&file).expect("a file");
+        window.harness.input_mut().dropped_files.push(Arc::new(Dropped(file)));
+    }
+    window.until_seen("If they are CT slices, select their member.");
+    assert!(has(&window, "2 files were let go on no member: b.tif is open in Photos."));
+    window.click("Photograph a.tif");
+    assert!(has(&window, "2 files were let go on no member: a.tif is open in Photos."));
+    window.ask(Action::Select(Some(0)));
+    window.until_seen("They are CT slices of Column 1");
+    window.click("They are CT slices of Column 1");
+    window.until_seen("to Column 1");
+    assert!(has(&window, "a.tif") && has(&window, "b.tif"));
+    assert!(!has(&window, "were let go on no member"));
+}
+
+/// What was framed in half of the panel, beside an earlier prediction, is seen as a whole when it has
+/// all of the panel again.
+#[test]
+fn what_was_framed_in_a_comparison_is_seen_as_a_whole_after_it() {
+    let (mut window, folder) = with_seen();
+    window.until("the prediction", |w| {
+        w.get_resource::<Latest>().is_some_and(|l| l.result.is_some())
+    });
+    window.until("a camera", |w| w.resource::<Viewpoint>().camera().is_some());
+    let file = folder.path().join("predict.json");
+    fs::write(&file, EARLIER).expect("written");
+    window.ask(Action::Compare(file));
+    window.frames(3);
+    window.ask(Action::Frame);
+    window.frames(3);
+    window.click("Compare");
+    window.until_seen("Nothing");
+    window.click("Nothing");
+    window.frames(3);
+    window.ask(Action::KeepView(String::new()));
+    window.frames(2);
+    let rect = window.harness.get_by_label("Damage of members").rect();
+    let [width, height] = [rect.width(), rect.height()].map(|n| n as u32);
+    let camera = Camera { width, height, ..view(&mut window, 0) };
+    let [low, high] = window.with(|w| w.resource::<CurrentScene>().0.bounds());
+    let ([right, up, forward], [hx, hy]) = (camera.frame(), camera.half_extent());
+    for corner in 0..8_u8 {
+        let end = |k: usize| if corner >> k & 1 == 1 { high[k] } else { low[k] };
+        let d = Vec3::from_array(std::array::from_fn(end)) - camera.position;
+        let [x, y] = [d.dot(right) / hx, d.dot(up) / hy].map(|s| s / d.dot(forward));
+        assert!(x.abs() < 1.0 && y.abs() < 1.0, "{corner}: {x} {y}");
+    }
+}
+
+/// An earlier prediction is turned with the newest, until they are parted.
+#[test]
+fn compared_pictures_are_turned_together_until_they_are_parted() {
+    let (mut window, folder) = with_seen();
+    window.until("the prediction", |w| {
+        w.get_resource::<Latest>().is_some_and(|l| l.result.is_some())
+    });
+    let file = folder.path().join("predict.json");
+    fs::write(&file, EARLIER).expect("written");
+    window.until("a camera", |w| w.resource::<Viewpoint>().camera().is_some());
+    window.ask(Action::Compare(file));
+    window.frames(3);
+    let mut kept = 0;
+    let mut newest = |window: &mut Window| {
+        window.ask(Action::KeepView(String::new()));
+        window.frames(2);
+        kept += 1;
+        view(window, kept - 1)
+    };
+    let rect = window.harness.get_by_label("Damage of members in an earlier prediction").rect();
+    let at = rect.center();
+    let before = newest(&mut window);
+    draw(&mut window, at, at + egui::vec2(60.0, 0.0));
+    let together = newest(&mut window);
+    assert!(together.position.distance(before.position) > 0.1);
+    window.ask(Action::Link);
+    window.frames(3);
+    draw(&mut window, at, at + egui::vec2(60.0, 0.0));
+    let parted = newest(&mut window);
+    assert!(parted.position.distance(together.position) < 1e-3);
 }
 
 /// FLIP is computed off the frame, anew for another view, and shown pixel by pixel.

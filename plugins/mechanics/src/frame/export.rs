@@ -29,17 +29,18 @@ impl Whole {
     }
 
     /// Writes its bars and its plates, drawn deformed, each file with the displacements as they
-    /// are.
+    /// are and with the hash of its scene.
     ///
     /// # Errors
     /// [`WriteError`].
-    pub fn write_vtu(&self, bars: &Path, plates: &Path) -> Result<(), WriteError> {
+    pub fn write_vtu(&self, bars: &Path, plates: &Path, scene: &str) -> Result<(), WriteError> {
         let picture = &self.picture;
         let points = picture.at(self.exaggeration());
         let field = Field { name: "displacement_m", components: 3, values: &picture.moved };
-        Grid::rods(&points, &picture.lines).write(bars, &[field], &[])?;
+        let lines = Grid::rods(&points, &picture.lines).of_scene(scene);
+        lines.write(bars, &[field], &[])?;
         let mesh = Mesh { nodes: points, ..picture.mesh.clone() };
-        Grid::solids(&mesh).write(plates, &[field], &[])
+        Grid::solids(&mesh).of_scene(scene).write(plates, &[field], &[])
     }
 
     /// End forces of every bar at every moment, as a table.

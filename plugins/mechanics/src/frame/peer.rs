@@ -308,7 +308,8 @@ fn the_slabs_of_the_bridge_sag_as_in_calculix() {
     }
     told.notes.iter().for_each(|note| println!("{note}"));
     if let Some(keep) = keep {
-        told.write_vtu(&keep.join("bars.vtu"), &keep.join("plates.vtu")).unwrap();
+        let [bars, plates] = ["bars.vtu", "plates.vtu"].map(|name| keep.join(name));
+        told.write_vtu(&bars, &plates, &scene.hash).unwrap();
         std::fs::write(keep.join("end_forces.csv"), told.csv()).unwrap();
     }
 }

@@ -124,11 +124,15 @@ impl Zone {
         let mut queue: Vec<u32> = hosts.collect();
         let mut seen: BTreeSet<u32> = queue.iter().copied().collect();
         let (mut near, mut whole) = (Vec::new(), 0.0);
-        let axis = ends(stretch);
+        let axis = Axis::along(ends(stretch));
+        // As far along the bar as the bricks reach that it lies in.
+        let [low, high] = axis.span(queue.iter().map(|&hex| points(model, hex)));
         while let Some(hex) = queue.pop() {
-            let corners = model.mesh.corners(hex);
-            let within = |natural: &&DVec3| apart(place(&corners, **natural), axis) <= reach;
-            let points = hex8::GAUSS.iter().filter(within).count();
+            let within = |point: &&DVec3| {
+                let [along, apart] = axis.place(**point);
+                apart <= reach && low <= along && along <= high
+            };
+            let points = points(model, hex).iter().filter(within).count();
             if points == 0 {
                 continue;
             }
@@ -152,16 +156,42 @@ impl Zone {
     }
 }
 
-fn place(corners: &[DVec3; 8], natural: DVec3) -> DVec3 {
-    hex8::shape(natural).iter().zip(corners).map(|(n, corner)| *n * *corner).sum()
+/// Where the law of a brick is asked.
+fn points(model: &Model, hex: u32) -> [DVec3; 8] {
+    let corners = model.mesh.corners(hex);
+    hex8::GAUSS.map(|natural| {
+        hex8::shape(natural).iter().zip(&corners).map(|(n, corner)| *n * *corner).sum()
+    })
 }
 
-/// Distance of a point from a segment, m.
-fn apart(point: DVec3, [from, to]: [DVec3; 2]) -> f64 {
-    let axis = to - from;
-    let share =
-        ((point - from).dot(axis) / axis.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-    point.distance(from + share * axis)
+/// A straight stretch of a bar.
+struct Axis {
+    from: DVec3,
+    along: DVec3,
+}
+
+impl Axis {
+    fn along([from, to]: [DVec3; 2]) -> Self {
+        Self { from, along: (to - from).normalize_or_zero() }
+    }
+
+    /// How far along it and how far from it a point is, m.
+    fn place(&self, point: DVec3) -> [f64; 2] {
+        let along = (point - self.from).dot(self.along);
+        [along, point.distance(self.from + along * self.along)]
+    }
+
+    /// The least and the most that points are along it, and a little more, m.
+    fn span(&self, bricks: impl Iterator<Item = [DVec3; 8]>) -> [f64; 2] {
+        let [low, high] = bricks
+            .flatten()
+            .map(|point| self.place(point)[0])
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], along| {
+                [low.min(along), high.max(along)]
+            });
+        let more = 1e-6 * (high - low);
+        [low - more, high + more]
+    }
 }
 
 #[cfg(test)]

@@ -34,6 +34,8 @@ pub struct Grid<'a> {
     offsets: Vec<i64>,
     types: Vec<u8>,
     regions: Vec<i32>,
+    /// Hash of the scene that it was computed of; empty: nobody says.
+    scene: &'a str,
 }
 
 /// VTK's numbers for cells.
@@ -84,6 +86,12 @@ impl<'a> Grid<'a> {
         grid
     }
 
+    /// Says in the file of which scene it is, by the hash that pictures and JSON of it have.
+    #[must_use]
+    pub fn of_scene(self, hash: &'a str) -> Self {
+        Self { scene: hash, ..self }
+    }
+
     fn push(&mut self, kind: u8, nodes: &[u32], region: u32) {
         self.connectivity.extend(nodes.iter().map(|&n| n as i32));
         self.offsets.push(self.connectivity.len() as i64);
@@ -116,7 +124,12 @@ impl<'a> Grid<'a> {
                 out,
                 r#"<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" header_type="UInt64">"#
             )?;
-            writeln!(out, "<!-- intrados {} -->", env!("CARGO_PKG_VERSION"))?;
+            // A comment, since not every reader knows fields of text. It must have no “--”.
+            let of = match self.scene {
+                "" => String::new(),
+                hash => format!(", scene hash {}", hash.replace('-', "_")),
+            };
+            writeln!(out, "<!-- intrados {}{of} -->", env!("CARGO_PKG_VERSION"))?;
             writeln!(
                 out,
                 r#"<UnstructuredGrid><Piece NumberOfPoints="{}" NumberOfCells="{}">"#,
@@ -338,6 +351,23 @@ mod tests {
             .collect();
         assert_eq!(nodes[..8], mesh.hexes[0].nodes);
         assert!(text.contains(r#"ComponentName4="yz""#));
+    }
+
+    #[test]
+    fn a_file_says_of_which_scene_it_is_and_by_which_version() {
+        let mesh = block(&[0.0, 1.0], &[0.0, 1.0], &[0.0, 1.0], "c").unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let comment = |hash: &str| {
+            let path = folder.path().join("a.vtu");
+            Grid::solids(&mesh).of_scene(hash).write(&path, &[], &[]).unwrap();
+            let text = std::fs::read_to_string(&path).unwrap();
+            let (_, behind) = text.split_once("<!-- ").unwrap();
+            behind.split_once(" -->").unwrap().0.to_owned()
+        };
+        let by = concat!("intrados ", env!("CARGO_PKG_VERSION"));
+        assert_eq!(comment("0a1b"), format!("{by}, scene hash 0a1b"));
+        assert_eq!(comment(""), by);
+        assert!(!comment("a-->b--").contains("--"));
     }
 
     #[test]

@@ -25,8 +25,10 @@ use source::{Read, Source};
 
 use crate::{
     Action, Actions, Selection,
+    album::{self, Leaf},
     lang::{drag, term},
     members,
+    workspace::Desk,
     zoom::Zoom,
 };
 
@@ -119,9 +121,36 @@ impl Ct {
         shown.read.plane.filter(|_| *hash == scene.hash && *of == member)
     }
 
+    /// The slice that was shown last with what was found in it, and its legend, where it is of this
+    /// scene.
+    pub(crate) fn leaf(&self, ui: &Ui, scene: &Scene) -> Option<Leaf> {
+        let ((hash, member, origin, ..), index) = self.of.as_ref()?;
+        let member = scene.members.get(*member).filter(|_| *hash == scene.hash)?;
+        // While another slice is read, it is the one before that is seen.
+        let shown = self.shown.as_ref().filter(|_| self.task.is_none())?.as_ref().ok()?;
+        let read = &shown.read;
+        let window = self.window.unwrap_or_else(|| read.suitable());
+        let mut image = draw::grey(read, window);
+        let labels = draw::labels(read, self.overlay);
+        image.pixels.iter_mut().zip(labels.pixels).for_each(|(pixel, on)| *pixel = pixel.blend(on));
+        let what = album::said(scene, &format!("{}, {}", member.name, read.caption()));
+        let unit = unit(*origin);
+        Some(Leaf {
+            name: format!("ct-{}-slice {}", member.id, index + 1),
+            legend: Some(picture::printed(read, window, unit, &what).drawn(ui, image.width())),
+            what,
+            draw: Box::new(move || image),
+        })
+    }
+
     fn method(&self) -> Method {
         self.method.unwrap_or(Method::Network)
     }
+}
+
+/// In what the grey of slices is.
+fn unit(origin: Origin) -> &'static str {
+    if origin == Origin::Scanned { "1/m" } else { "grey" }
 }
 
 pub(crate) fn ct(
@@ -134,6 +163,7 @@ pub(crate) fn ct(
     mut ct: ResMut<Ct>,
     mut jobs: ResMut<Jobs>,
     mut actions: ResMut<Actions>,
+    desk: Res<Desk>,
 ) {
     let ct = ct.bypass_change_detection();
     if let Some(predicting) = predicting {
@@ -176,7 +206,7 @@ pub(crate) fn ct(
     ct.index = ct.index.min(sources.len() - 1);
     let volume = done.map_or(0, |d| Arc::as_ptr(&d.restored) as usize);
     let stack = (scene.hash.clone(), member, origin, volume, ct.method());
-    ask(ct, scene, &sources, stack, &mut jobs);
+    ask(ct, scene, &sources, stack, desk.links(), &mut jobs);
     collect(ui, ct);
     tools(ui, ct, &sources, scan.is_some());
     let mut area = ui.available_rect_before_wrap();
@@ -186,7 +216,7 @@ pub(crate) fn ct(
     {
         return scan::sinogram(ui, &mut ct.forming, scan, area);
     }
-    let unit = if origin == Origin::Scanned { "1/m" } else { "grey" };
+    let unit = unit(origin);
     let left = Rect::from_min_max(
         area.min,
         pos2((area.right() - ASIDE - 8.0).max(area.left() + 120.0), area.bottom()),
@@ -249,6 +279,7 @@ fn ask(
     scene: &Arc<Scene>,
     sources: &[(String, Source)],
     stack: Stack,
+    is_linked: bool,
     jobs: &mut Jobs,
 ) {
     let wanted = (stack.clone(), ct.index);
@@ -256,7 +287,12 @@ fn ask(
         // Of the same stack the slice before stays until the new one is there.
         let same = ct.of.as_ref().is_some_and(|(of, _)| *of == stack);
         if !same {
-            (ct.shown, ct.view) = (None, Zoom::default());
+            ct.shown = None;
+        }
+        // As scanned and as told, by one method and by another, the same place of a member is seen.
+        let of_one = |of: &Stack| (&of.0, of.1) == (&stack.0, stack.1);
+        if !(same || is_linked && ct.of.as_ref().is_some_and(|(of, _)| of_one(of))) {
+            ct.view = Zoom::default();
         }
         ct.picked = None;
         ct.of = Some(wanted);

@@ -6,6 +6,7 @@ use super::{Ct, Probe, Shown, draw, source::Read};
 use crate::{
     colours,
     lang::{fixed, term},
+    legend::Legend,
     number::{percent, significant},
     zoom::Zoom,
 };
@@ -144,6 +145,20 @@ fn under(read: &Read, at: Vec2, unit: &str) -> Option<String> {
         );
     }
     Some(text)
+}
+
+/// What greys and outlines mean, and what is shown, for a file.
+pub(super) fn printed(read: &Read, [low, high]: [f32; 2], unit: &str, what: &str) -> Legend {
+    let number = |share: f32| significant(f64::from(low + share * (high - low)), 3);
+    let marks = [0.0, 1.0, 0.5].map(|share| (share, number(share)));
+    let ink = |colour: Color32| [colour.r(), colour.g(), colour.b()];
+    let (pores, cracks) = (read.found.pores.len(), read.found.cracks.len());
+    let samples = vec![
+        (ink(draw::PORE), tr!("{} pores", pores)),
+        (ink(draw::CRACK), tr!("{} cracks", cracks)),
+    ];
+    let lines = vec![term(unit), what.to_owned()];
+    Legend::plain((0..=u8::MAX).map(|grey| [grey; 3]).collect(), marks.into(), samples, lines)
 }
 
 /// Grey with its values.

@@ -2,6 +2,7 @@
 //! then what it shows of the member, without the light, is read.
 
 mod model;
+mod prints;
 mod sheet;
 mod work;
 
@@ -20,6 +21,7 @@ use crate::{
     Action, Actions, Selection, Viewpoint,
     lang::{fixed, term},
     members,
+    workspace::Desk,
     zoom::Zoom,
 };
 
@@ -180,7 +182,8 @@ impl Shot {
         if let Some(done) = Task::take(&mut self.placing) {
             self.located = Some(match done {
                 Ok(Ok(Placed { located, picture })) => {
-                    self.texture.set(picture, TextureOptions::LINEAR);
+                    self.texture.set(picture.clone(), TextureOptions::LINEAR);
+                    self.opened.picture = picture;
                     Ok(located)
                 }
                 Ok(Err(why)) => Err(why),
@@ -211,6 +214,7 @@ pub(crate) fn photos(
     mut jobs: ResMut<Jobs>,
     mut actions: ResMut<Actions>,
     mut viewpoint: ResMut<Viewpoint>,
+    desk: Res<Desk>,
 ) {
     let photos = photos.bypass_change_detection();
     let Some(scene) = scene else { return };
@@ -222,7 +226,7 @@ pub(crate) fn photos(
         return members::choose(ui, scene, |_| true, &why, &none, &mut actions);
     };
     choose(ui, photos, scene, member, &mut actions);
-    ask(photos, scene, member, &mut jobs);
+    ask(photos, scene, member, desk.links(), &mut jobs);
     let area = ui.available_rect_before_wrap();
     collect(ui, photos);
     match &mut photos.shot {
@@ -317,7 +321,7 @@ fn of_member<'a>(scene: &'a Scene, member: &'a Member) -> impl Iterator<Item = &
 }
 
 /// Opens what was chosen, if it is another one.
-fn ask(photos: &mut Photos, scene: &Arc<Scene>, member: &Member, jobs: &mut Jobs) {
+fn ask(photos: &mut Photos, scene: &Arc<Scene>, member: &Member, is_linked: bool, jobs: &mut Jobs) {
     let Some(file) = photos.chosen.clone() else {
         (photos.of, photos.shot, photos.opening) = (None, None, None);
         return;
@@ -328,8 +332,12 @@ fn ask(photos: &mut Photos, scene: &Arc<Scene>, member: &Member, jobs: &mut Jobs
     }
     let is_other = photos.of.as_ref().is_some_and(|(_, id, _)| *id != member.id);
     photos.of = Some(key.clone());
+    // The next photograph of the same member is seen where the one before was, unless that was a
+    // face.
+    if !is_linked || is_other || photos.face.is_some() {
+        photos.zoom = Zoom::default();
+    }
     (photos.shot, photos.armed, photos.face, photos.marked) = (None, None, None, None);
-    photos.zoom = Zoom::default();
     let told = of_member(scene, member).find(|p| p.file == key.2).cloned();
     // Of another member its own photographs are looked at first.
     if told.is_none() && is_other {

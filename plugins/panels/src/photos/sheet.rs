@@ -10,7 +10,7 @@ use crate::{
 
 /// A click so many points beside a find still means it.
 const REACH: f32 = 8.0;
-const FOUND: Color32 = Color32::from_rgb(213, 62, 0);
+pub(super) const FOUND: Color32 = Color32::from_rgb(213, 62, 0);
 
 /// Draws what is looked at; a click picks the corner that is meant, or a find.
 pub(super) fn show(ui: &mut Ui, photos: &mut Photos, rect: Rect) {

@@ -28,7 +28,7 @@ use crate::{
 };
 
 pub(crate) use evidence::Listing;
-pub(crate) use properties::Properties;
+pub(crate) use properties::{Properties, Unapplied};
 
 /// Draws it.
 pub(crate) fn member(

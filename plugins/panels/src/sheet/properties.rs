@@ -6,9 +6,14 @@ use std::sync::Arc;
 use bevy_ecs::prelude::*;
 use egui::{Button, Ui};
 use intrados_scene::{Member, Scene, attach::fields};
+use serde::{Deserialize, Serialize};
 
 use super::part;
-use crate::{Action, Actions, lang::term, values::Values};
+use crate::{
+    Action, Actions,
+    lang::term,
+    values::{Typed, Values},
+};
 
 /// What has been typed; of another member or another scene it is begun anew.
 #[derive(Resource, Default)]
@@ -16,9 +21,37 @@ pub(crate) struct Properties {
     /// The scene's hash, and the member's id.
     of: (String, Option<String>),
     values: Values,
+    /// What another session has left, and the hash of the scene that it is of; it waits until its
+    /// form is drawn.
+    left: Option<(String, Unapplied)>,
+}
+
+/// What has been typed into the form and is not applied.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct Unapplied {
+    /// The member's id; none: it is of the whole structure.
+    member: Option<String>,
+    typed: Vec<Typed>,
 }
 
 impl Properties {
+    /// What has been typed of this scene and is not applied, if anything is.
+    pub(crate) fn unapplied(&self, scene: &Scene) -> Option<Unapplied> {
+        let left = self.left.as_ref().filter(|(of, _)| *of == scene.hash);
+        if let Some((_, left)) = left {
+            return Some(left.clone());
+        }
+        let (of, member) = &self.of;
+        let typed = self.values.typed();
+        let is_typed = *of == scene.hash && !typed.is_empty();
+        is_typed.then(|| Unapplied { member: member.clone(), typed })
+    }
+
+    /// Goes on with what another session has left of this scene.
+    pub(crate) fn go_on(&mut self, scene: &Scene, left: Unapplied) {
+        *self = Self { left: Some((scene.hash.clone(), left)), ..Self::default() };
+    }
+
     /// Draws it.
     pub(super) fn show(
         &mut self,
@@ -29,14 +62,20 @@ impl Properties {
     ) {
         let of = (scene.hash.clone(), member.map(|m| m.id.clone()));
         if self.of != of {
-            *self = Self { of, values: Values::new(fields(scene, member)) };
+            self.values = Values::new(fields(scene, member));
+            self.of = of;
+        }
+        let left = self.left.take_if(|(of, left)| (&*of, &left.member) == (&self.of.0, &self.of.1));
+        if let Some((_, left)) = left {
+            self.values.type_again(&left.typed);
         }
         if self.values.is_empty() {
             return;
         }
         let of_member = "Concrete, size, bars, loads";
         let name = member.map_or("Owner, inspection, air", |_| of_member);
-        part(ui, name, false, |ui| {
+        // What another session has left is seen at once.
+        part(ui, name, self.values.changed() > 0, |ui| {
             if scene.path.exists() {
                 self.send(ui, scene, member, actions);
             } else {

@@ -28,7 +28,9 @@ use intrados_stage::{
 use quantity::Quantity;
 
 use crate::{
-    Actions, Colours, Log, Look, Selection, colours,
+    Actions, Colours, Log, Look, Selection,
+    album::{Leaf, on_ground},
+    colours,
     lang::{drag, fixed, lines, local, slide, term},
     legend::Legend,
     members,
@@ -149,6 +151,32 @@ struct Key {
 impl Stress {
     pub(crate) fn is_busy(&self) -> bool {
         self.task.is_some()
+    }
+
+    /// The picture that was shown last, with its legend, where it is of this scene.
+    pub(crate) fn leaf(
+        &self,
+        ui: &Ui,
+        scene: &Scene,
+        analyses: &Analyses,
+        colours: Colours,
+        ranges: &Ranges,
+    ) -> Option<Leaf> {
+        let (hash, model) = &self.of;
+        let analysis = analyses.get(model).filter(|_| *hash == scene.hash)?;
+        let skin = analysis.seen.skin()?;
+        let shown = self.shown.as_ref().filter(|s| s.key.skin == Arc::as_ptr(&skin) as usize)?;
+        let Key { moment: index, quantity, part, scale: auto, .. } = shown.key;
+        let (shot, count) = (analysis.seen.shot(index)?, analysis.seen.count());
+        let (skin, shot) = (&skin, &shot);
+        let view = View { skin, shot, analysis, part, index, count, auto, colours, ranges };
+        let (image, ground) = (shown.drawn.image.clone(), ui.visuals().extreme_bg_color);
+        Some(Leaf {
+            name: format!("{}-{model}", quantity.file(skin)),
+            what: view.caption(quantity, shown),
+            legend: Some(view.legend(quantity, shown).drawn(ui, image.width())),
+            draw: Box::new(move || on_ground(image, ground)),
+        })
     }
 }
 

@@ -55,6 +55,24 @@ impl Quantity {
         }
     }
 
+    /// What the file of its picture is called; English, as all files are.
+    pub(crate) fn file(self, skin: &Skin) -> String {
+        const PLAIN: [&str; 6] = ["xx", "yy", "zz", "xy", "yz", "zx"];
+        const ROUND: [&str; 6] = ["r", "theta", "z", "r-theta", "theta-z", "z-r"];
+        match self {
+            Self::First => "largest-principal-stress".into(),
+            Self::Third => "smallest-principal-stress".into(),
+            Self::Mises => "von-mises-stress".into(),
+            Self::Component(k) => {
+                let names = if skin.axis.is_some() { ROUND } else { PLAIN };
+                format!("stress-{}", names[usize::from(k) % 6])
+            }
+            Self::Damage => "analysed-damage".into(),
+            Self::Crack => "crack-width".into(),
+            Self::Displacement => "displacement".into(),
+        }
+    }
+
     /// Its unit, a [`term`], and what an SI value is multiplied by.
     pub(crate) fn unit(self) -> (&'static str, f32) {
         match self {

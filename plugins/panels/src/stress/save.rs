@@ -9,7 +9,7 @@ use intrados_mechanics::{
     write::csv,
 };
 
-use crate::{export::write_png, lang::fixed, legend::put_under};
+use crate::{album::on_ground, export::write_png, lang::fixed, legend::put_under};
 
 /// What is written, by the ending of the file's name.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -32,13 +32,13 @@ impl Kind {
 
 /// Writes the picture on the window's background, its legend under it; `what` says what it shows.
 pub(super) fn picture(
-    mut image: ColorImage,
+    image: ColorImage,
     background: egui::Color32,
     legend: &ColorImage,
     path: &Path,
     what: &str,
 ) -> Result<String, String> {
-    image.pixels.iter_mut().for_each(|p| *p = background.blend(*p));
+    let image = on_ground(image, background);
     write_png(&put_under(&image, legend), path, what).map_err(|e| e.to_string())?;
     Ok(format!("{}: {what}", path.display()))
 }

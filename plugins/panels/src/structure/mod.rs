@@ -4,6 +4,7 @@ mod compass;
 mod flight;
 mod measure;
 mod model;
+mod prints;
 mod section;
 mod settled;
 mod slice;
@@ -31,8 +32,10 @@ use crate::{
     history::{Earlier, History},
     lang::fixed,
     moment::{Courses, Moment, Seen, Timeline},
+    orbit,
     play::Play,
     saving::Saving,
+    workspace::Desk,
 };
 
 /// What one row of tools covers at the head of the picture, with a little air, points.
@@ -94,8 +97,14 @@ pub(crate) struct Structure {
     /// Where it is cut open.
     section: Option<Section>,
     tape: Tape,
+    /// Where the slice of the CT tab lies.
+    outline: slice::SliceOutline,
     /// Where on its member the evidence is that a form asks for.
     place: Option<Vec3>,
+    /// An earlier prediction is seen from where the newest is.
+    is_linked: bool,
+    /// Where it was looked at from before the picture was parted in two.
+    parted: Option<Camera>,
     wished: Option<View>,
     /// A camera through which somebody wants to look, and the hash of the scene that it is of; it
     /// waits until the panel is in sight.
@@ -116,7 +125,10 @@ impl Default for Structure {
             names: true,
             section: None,
             tape: Tape::default(),
+            outline: slice::SliceOutline::default(),
             place: None,
+            is_linked: true,
+            parted: None,
             wished: None,
             followed: None,
             is_lit: false,
@@ -146,6 +158,11 @@ impl Structure {
         self.followed.as_ref().map(|(_, camera)| camera).or(self.model.camera())
     }
 
+    /// Whether somebody wants to look from elsewhere.
+    pub(crate) fn is_called(&self) -> bool {
+        self.wished.is_some() || self.followed.is_some()
+    }
+
     /// Looks at the scene from there, whatever else was wished before; whoever goes
     /// elsewhere flies no more.
     pub(crate) fn follow(&mut self, scene: &Scene, camera: &Camera) {
@@ -170,6 +187,24 @@ impl Structure {
             let member = member.filter(|_| view == View::Framed);
             self.model.go(view, scene, member);
             self.model.camera().iter().for_each(|camera| self.earlier.follow(camera));
+        }
+    }
+
+    /// Two pictures have half of the panel each. Once one has all of it again, as wide, all of what
+    /// was seen is still seen, if anybody has moved there; else it is as it was before.
+    fn part(&mut self, is_compared: bool, width: f32) {
+        let Some(camera) = self.model.camera().cloned() else { return };
+        if is_compared {
+            self.parted.get_or_insert(camera);
+            return;
+        }
+        let Some(before) = self.parted.take() else { return };
+        let place = |c: &Camera| (c.position, c.target, c.fov_deg);
+        if place(&before) != place(&camera) {
+            // The angle is across the width: of a wider picture of the same angle less of the height
+            // is seen.
+            let wider = width / camera.width.max(1) as f32;
+            self.aim(&orbit::dolly(&camera, wider.max(1.0)));
         }
     }
 
@@ -271,13 +306,16 @@ pub(crate) fn structure(
     ct: Res<Ct>,
     mut jobs: ResMut<Jobs>,
     mut actions: ResMut<Actions>,
+    desk: Res<Desk>,
 ) {
     let Some(scene) = scene else { return };
     let scene = &scene.0;
     let jobs = jobs.bypass_change_detection();
+    structure.bypass_change_detection().is_linked = desk.links();
     let whole = ui.available_rect_before_wrap();
     let history = history.bypass_change_detection();
     let structure = structure.bypass_change_detection();
+    structure.part(history.beside().is_some(), whole.width());
     structure.go(scene, selection.0, history.beside().is_some());
     structure.fly(ui, scene, *selection);
     let section = structure.section;
@@ -331,12 +369,16 @@ pub(crate) fn structure(
         };
         structure.model.names(ui, rect, scene, &value, *selection, &pointed.camera);
     }
-    structure.earlier.follow(&pointed.camera);
+    if structure.is_linked {
+        structure.earlier.follow(&pointed.camera);
+    }
     compass::draw(ui, rect, &pointed.camera);
     let sliced = selection.0.and_then(|member| Some((member, ct.plane(scene, member)?)));
     if let Some((member, plane)) = sliced {
-        let triangles = structure.model.triangles(member);
-        slice::draw(ui, rect, &pointed.camera, triangles, plane);
+        let Structure { model, outline, .. } = &mut *structure;
+        let model = &*model;
+        outline.follow((scene.hash.as_str(), member, plane), || model.triangles(member));
+        outline.draw(ui, rect, &pointed.camera);
     }
     structure.tape.draw(ui, rect, &pointed.camera);
     structure.place.iter().for_each(|at| measure::end(ui, rect, &pointed.camera, *at));
@@ -374,7 +416,7 @@ fn to_light(ui: &mut Ui, rect: Rect, actions: &mut Actions) {
     }
 }
 
-/// The structure as an earlier prediction has it, from the same side.
+/// The structure as an earlier prediction has it, from the same side unless both were parted.
 fn beside(
     ui: &mut Ui,
     rect: Rect,
@@ -390,7 +432,9 @@ fn beside(
         structure.earlier.show(ui, rect, scene, &seen, Scale::DAMAGE, selection, section, jobs);
     let Some(pointed) = shown else { return };
     model::ruler(ui, rect, &pointed.camera);
-    structure.model.follow(&pointed.camera);
+    if structure.is_linked {
+        structure.model.follow(&pointed.camera);
+    }
     if structure.names {
         let value = |i: usize| earlier.member(&scene.members[i].id)?.damage().map(|d| d.value);
         structure.earlier.names(ui, rect, scene, &value, selection, &pointed.camera);
@@ -581,7 +625,7 @@ fn views(ui: &mut Ui, structure: &mut Structure, selection: Selection, actions: 
     }
     for (aspect, key) in Aspect::ALL {
         if ui.button(aspect.name()).on_hover_text(key).clicked() {
-            structure.look_from(aspect);
+            actions.ask(Action::LookFrom(aspect));
         }
     }
 }

@@ -14,8 +14,11 @@ use super::{
     spot::Spot,
 };
 use crate::{
-    Latest, Selection, colours,
+    Latest, Selection,
+    album::{Drawing, on_ground},
+    colours,
     lang::{fixed, local, term},
+    legend::Legend,
     lengths,
     moment::{Seen, place as place_of},
     number::plus_minus,
@@ -44,6 +47,11 @@ const PARALLEL: f32 = 1.0;
 /// Pixels that are drawn within a frame.
 const COARSE: f64 = 4e5;
 
+/// Pixels of a picture that becomes a file.
+const PRINTED: u32 = 1600 * 1000;
+/// Sides of a picture, pixels, least and most.
+const SIDES: (usize, usize) = (8, 4096);
+
 /// Share of the picture's height that is kept free for tools at most.
 const MOST_COVERED: f32 = 0.4;
 
@@ -66,6 +74,29 @@ impl Scale {
     pub(super) const NONE: Self = Self { name: "", top: 1.0 };
     /// Of what years add, which is less.
     pub(super) const ADDED: Self = Self { name: "d is added", top: 0.4 };
+
+    /// What stands beside the colour at a share of it.
+    fn written(self, share: f32) -> String {
+        let is_whole = self.top >= 1.0;
+        match share {
+            0.0 if is_whole => tr!("0 sound"),
+            1.0 if is_whole => tr!("1 lost"),
+            1.0 => tr!("{} or more", local(self.top.to_string())),
+            _ => fixed(f64::from(share) * self.top, 2),
+        }
+    }
+
+    /// The legend of a picture that becomes a file, with lines on what it shows.
+    pub(super) fn printed(self, lines: Vec<String>) -> Legend {
+        const STEPS: u8 = 96;
+        let colour = |k: u8| colours::damage((f32::from(k) + 0.5) / f32::from(STEPS), false);
+        let marks = [0.0, 1.0, 0.5, 0.25, 0.75].map(|share| (share, self.written(share)));
+        let samples = vec![
+            (colours::damage(f32::NAN, false), tr!("unknown")),
+            (colours::damage(0.25, true), tr!("forecast|legend")),
+        ];
+        Legend::plain((0..STEPS).map(colour).collect(), marks.into(), samples, lines)
+    }
 }
 
 /// What is shown of a structure.
@@ -224,7 +255,7 @@ impl Model {
             scale,
             selection,
             camera: camera.clone(),
-            size: size.map(|n| n.clamp(8, 4096)),
+            size: size.map(|n| n.clamp(SIDES.0, SIDES.1)),
             section,
         };
         self.redraw(ui, rect, key, is_moving, jobs);
@@ -331,6 +362,39 @@ impl Model {
         };
         let placed = Camera { position: from, target: Vec3::ZERO, ..camera.clone() };
         self.camera = Some(framed(&placed, bounds(&points), self.head));
+    }
+
+    /// Where a picture for a file looks from that shows what is looked at; none: there is nothing to
+    /// be seen.
+    pub(super) fn sight(&self, scene: &Scene) -> Option<Camera> {
+        if self.facets.is_empty() {
+            return None;
+        }
+        let first = || first(&self.positions, scene, [1600, 1000], 0.0);
+        Some(sized(&self.camera.clone().unwrap_or_else(first)))
+    }
+
+    /// All of it from another side, in a picture of the same shape.
+    pub(super) fn aside(&self, camera: &Camera, axis: Vec3) -> Camera {
+        let placed = Camera { position: axis, target: Vec3::ZERO, ..camera.clone() };
+        framed(&placed, bounds(&self.positions), 0.0)
+    }
+
+    /// What draws it from a camera in that one's pixels, before a ground.
+    pub(super) fn print(
+        &self,
+        mut seen: Vec<Seen>,
+        scale: Scale,
+        section: Option<Section>,
+        camera: Camera,
+        ground: Color32,
+    ) -> Drawing {
+        let members = self.facets.iter().map(|f| f.member + 1).max().unwrap_or(0);
+        seen.resize(members, Seen::default());
+        let size = [camera.width, camera.height].map(|n| (n as usize).clamp(SIDES.0, SIDES.1));
+        let key = Key { seen, scale, selection: Selection(None), camera, size, section };
+        let paint = self.painter(&key);
+        Box::new(move || on_ground(paint(size, 2).drawn.image, ground))
     }
 
     /// What members are called and how they fare, the worst first where names would overlap.
@@ -471,6 +535,11 @@ impl Model {
             Painted { facets, drawn }
         }
     }
+}
+
+/// The same view in the pixels of a file.
+pub(super) fn sized(camera: &Camera) -> Camera {
+    orbit::scaled(camera, PRINTED)
 }
 
 /// A size with few enough pixels to be drawn within a frame.
@@ -669,14 +738,7 @@ pub(super) fn legend(ui: &Ui, rect: Rect, scale: Scale) {
     };
     for tick in [0.0, 0.25, 0.5, 0.75, 1.0] {
         let at = pos2(bar.right() + 5.0, y(tick));
-        let is_whole = scale.top >= 1.0;
-        let word = match tick {
-            0.0 if is_whole => tr!("0 sound"),
-            1.0 if is_whole => tr!("1 lost"),
-            1.0 => tr!("{} or more", local(scale.top.to_string())),
-            _ => fixed(f64::from(tick) * scale.top, 2),
-        };
-        write(at, Align2::LEFT_CENTER, &word);
+        write(at, Align2::LEFT_CENTER, &scale.written(tick));
     }
     write(back.min + vec2(8.0, 6.0), Align2::LEFT_TOP, &term(scale.name));
     let mut patch = Rect::from_min_size(bar.left_bottom() + vec2(0.0, 10.0), vec2(14.0, 10.0));

@@ -59,7 +59,8 @@ impl Settling {
         if light.look.quantity != Quantity::Radiance {
             return say(ui, rect, ink, tr!("no light: the Render tab shows errors or a field"));
         }
-        if self.asked.as_ref() != Some(&wanted) {
+        // Of a part of the picture there is not enough to lay over all of the structure.
+        if self.asked.as_ref() != Some(&wanted) || light.viewpoint.is_part() {
             self.asked = Some(wanted.clone());
             light.viewpoint.go(wanted);
             return;

@@ -105,7 +105,7 @@ pub(super) fn write(ui: &Ui, rect: Rect, years: f64, timeline: &Timeline) {
 }
 
 /// When that is, in words; with the year where anybody says what day now is.
-fn told(years: f64, timeline: &Timeline) -> String {
+pub(super) fn told(years: f64, timeline: &Timeline) -> String {
     let [days, months] = [YEAR / DAY, 12.0].map(|by| fixed(years.abs() * by, 0));
     let said = match (years > 0.0, years.abs()) {
         (_, span) if span < 0.5 * DAY / YEAR => tr!("now"),

@@ -72,11 +72,14 @@ pub fn bcf(
     version: Version,
 ) -> io::Result<Vec<u8>> {
     let place = &scene.structure.georeference;
-    let teller = Teller { prediction, basis, place, created: stamp(created), version };
-    let mut file = Archive::new();
-    file.add("bcf.version", &version.edition())?;
+    // By its file: a folder is called anew for the next inspection.
+    let stem = scene.path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
+    let file = stem.unwrap_or_else(|| prediction.scene.clone());
+    let teller = Teller { prediction, file, basis, place, created: stamp(created), version };
+    let mut archive = Archive::new();
+    archive.add("bcf.version", &version.edition())?;
     if version == Version::V3_0 {
-        file.add("extensions.xml", &extensions())?;
+        archive.add("extensions.xml", &extensions())?;
     }
     for member in &prediction.members {
         let mut found: Vec<Option<&Defect>> = member.defects.iter().map(Some).collect();
@@ -93,14 +96,14 @@ pub fn bcf(
             let guid = teller.guid(&topic, "topic");
             let snapshot = defect.and_then(picture);
             let markup = teller.markup(&topic, snapshot.is_some().then_some(SNAPSHOT));
-            file.add(&format!("{guid}/markup.bcf"), &markup)?;
+            archive.add(&format!("{guid}/markup.bcf"), &markup)?;
             if let Some(png) = snapshot {
-                file.add_bytes(&format!("{guid}/{SNAPSHOT}"), &png)?;
+                archive.add_bytes(&format!("{guid}/{SNAPSHOT}"), &png)?;
             }
-            file.add(&format!("{guid}/{VIEWPOINT}"), &teller.viewpoint(&topic, view))?;
+            archive.add(&format!("{guid}/{VIEWPOINT}"), &teller.viewpoint(&topic, view))?;
         }
     }
-    file.finish()
+    archive.finish()
 }
 
 impl Version {
@@ -138,6 +141,8 @@ impl Told<'_> {
 
 struct Teller<'a> {
     prediction: &'a Prediction,
+    /// What the scene's file is called, without its ending.
+    file: String,
     basis: &'a Basis,
     place: &'a Georeference,
     created: String,
@@ -161,7 +166,7 @@ impl Teller<'_> {
         let first =
             |d: &Defect| d.course.first().map_or_else(|| d.item.clone(), |f| f.item.clone());
         let item = told.defect.map(|d| (d.kind, first(d)));
-        let key = json!([self.prediction.scene, told.member.id, kind, item, what]).to_string();
+        let key = json!([self.file, told.member.id, kind, item, what]).to_string();
         let mut bytes = [0; 16];
         bytes.copy_from_slice(&blake3::hash(key.as_bytes()).as_bytes()[..16]);
         uuid::Builder::from_custom_bytes(bytes).into_uuid().to_string()
