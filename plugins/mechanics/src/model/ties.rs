@@ -6,7 +6,7 @@
 //! its diameters (CEB-FIP 1978), however the mesh divides it. Its steel is spread evenly over that
 //! zone, as far as it is concrete that hangs together with the brick that the bar lies in.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashSet};
 
 use glam::DVec3;
 
@@ -14,13 +14,15 @@ use super::{Matter, Model, Steel, SteelKind};
 use crate::{
     element::{hex8, rod::Piece},
     material::law::Ties,
-    mesh::{Mesh, voxel::distance::Triangles},
+    mesh::{HexFace, voxel::distance::Triangles},
 };
 
 /// How far from its axis a bar keeps cracks apart, over its distance from the surface.
 const DEEP: f64 = 1.5;
 /// The most of that, in diameters.
 const REACH: f64 = 7.5;
+/// Cosine from which on a face is square to an axis.
+const SQUARE: f64 = 0.99;
 /// Cosine from which on a face's normal runs along a bar: it is where the bar ends.
 const ALONG: f64 = 0.7;
 /// Pieces of a bar are looked at together up to so many diameters.
@@ -42,7 +44,7 @@ pub(super) fn ties(model: &Model) -> Vec<Ties> {
         return ties;
     }
     let neighbours = model.mesh.neighbours();
-    let surface = surface(&model.mesh);
+    let surface = surface(model);
     for (steel, yielding) in bars() {
         for stretch in stretches(steel, STRETCH * steel.diameter()) {
             let reach = (REACH * steel.diameter()).min(DEEP * beside(&surface, stretch));
@@ -60,13 +62,22 @@ pub(super) fn ties(model: &Model) -> Vec<Ties> {
     ties
 }
 
-/// All that has nothing behind it.
-fn surface(mesh: &Mesh) -> Triangles {
+/// All that has nothing behind it, but for planes of symmetry: there concrete goes on.
+fn surface(model: &Model) -> Triangles {
+    let mesh = &model.mesh;
+    let held: HashSet<(u32, u8)> = model.holds.iter().copied().collect();
+    let goes_on = |face: HexFace| {
+        let normal = mesh.face_middle(face).1.normalize_or_zero();
+        let axis = normal.abs().max_position();
+        normal.abs()[axis] > SQUARE
+            && mesh.face(face).iter().all(|&node| held.contains(&(node, axis as u8)))
+    };
     let halves = |face| {
         let [a, b, c, d] = mesh.face(face).map(|n| mesh.nodes[n as usize]);
         [[a, b, c], [a, c, d]]
     };
-    Triangles::new(mesh.outer_faces().into_iter().flat_map(halves).collect())
+    let faces = mesh.outer_faces().into_iter().filter(|&face| !goes_on(face));
+    Triangles::new(faces.flat_map(halves).collect())
 }
 
 /// How far the surface beside a stretch of a bar is from it, m.
@@ -266,5 +277,15 @@ mod tests {
         let mut lumped = prism(1.0);
         (lumped.steel[0].area, lumped.steel[0].count) = (3.0 * 2.01e-4, 3.0);
         assert!((ties(&lumped)[0].cracks[0] / (3.0 * expected) - 1.0).abs() < 1e-3);
+    }
+    /// Half of a prism is no thinner than all of it.
+    #[test]
+    fn concrete_goes_on_beyond_a_plane_of_symmetry() {
+        let mut model = prism(0.1);
+        let point = DVec3::new(0.5, 0.01, 0.2);
+        assert!((surface(&model).distance(point) - 0.01).abs() < 1e-9);
+        let nodes = (0..).zip(&model.mesh.nodes);
+        model.holds = nodes.filter(|(_, p)| p.y < 1e-9).map(|(n, _)| (n, 1)).collect();
+        assert!((surface(&model).distance(point) - 0.2).abs() < 1e-9);
     }
 }
