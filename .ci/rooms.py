@@ -16,7 +16,7 @@ CIRCLES = {
     "mechanics": [{"element", "mesh"}],
     "panels": [
         {"picture", "refine", "statistics", "viewpoint"},
-        {"action", "attach", "banner", "command", "create", "ct", "dialog", "drops", "edits", "export", "layout", "light_line", "line", "members", "photos", "report", "saving", "session", "start", "stress", "structure", "views"},
+        {"action", "album", "attach", "banner", "border", "command", "create", "ct", "dialog", "drops", "edits", "export", "layout", "light_line", "line", "members", "photos", "report", "saving", "session", "sheet", "start", "stress", "structure", "trail", "views"},
     ],
     "scene": [{"file", "load", "parametric"}, {"member", "scene", "structure"}],
 }

@@ -7,6 +7,8 @@ use egui::{
     TextureHandle, Ui, Vec2, pos2,
 };
 
+use intrados_light::plugin::{ActiveCamera, Lit};
+
 use crate::{Viewpoint, line, picture::Picture};
 
 /// Least side of the part, pixels.
@@ -28,6 +30,17 @@ pub(crate) fn end(world: &mut World) -> bool {
     border.ends = None;
     let was_on = std::mem::take(&mut border.is_on);
     world.resource_mut::<Viewpoint>().refine_all() || was_on
+}
+
+/// Another scene has no part of this one.
+pub(crate) fn leave(
+    lit: Option<Res<Lit>>,
+    active: Option<Res<ActiveCamera>>,
+    mut border: ResMut<Border>,
+) {
+    if lit.is_some_and(|lit| lit.is_changed()) && active.is_some_and(|it| it.is_changed()) {
+        border.forget();
+    }
 }
 
 impl Border {

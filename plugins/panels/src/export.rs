@@ -17,9 +17,9 @@ use intrados_transport::Side;
 
 use crate::{
     Action, Actions, Banners, Log, Look, Quantity,
-    album::{Drawing, Leaf},
     fields::{self, Fields, Painted},
     lang::{local, term},
+    leaf::{Drawing, Leaf},
     legend::{Legend, put_under},
     number::{count, plus_minus, significant},
     picture,

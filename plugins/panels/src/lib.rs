@@ -24,6 +24,7 @@ mod history;
 mod inspector;
 mod kept;
 mod layout;
+mod leaf;
 mod legend;
 mod lengths;
 mod light_line;

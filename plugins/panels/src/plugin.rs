@@ -113,7 +113,10 @@ impl Plugin for PanelsPlugin {
                     .chain()
                     .in_set(Stage::Load),
             )
-            .add_systems(Update, (layout::greet, viewpoint::adopt).chain().in_set(Stage::Estimate))
+            .add_systems(
+                Update,
+                (layout::greet, viewpoint::adopt, border::leave).chain().in_set(Stage::Estimate),
+            )
             .add_systems(
                 Update,
                 (

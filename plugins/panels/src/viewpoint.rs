@@ -8,7 +8,7 @@ use intrados_light::{
 };
 use intrados_scene::Camera;
 
-use crate::{Look, Refine, border::Border, orbit, picture::Picture};
+use crate::{Look, Refine, orbit, picture::Picture};
 
 /// Largest film in the window, pixels.
 const FULL: u32 = 1 << 20;
@@ -116,7 +116,6 @@ pub(crate) fn adopt(
     mut viewpoint: ResMut<Viewpoint>,
     mut look: ResMut<Look>,
     mut picture: ResMut<Picture>,
-    mut border: ResMut<Border>,
 ) {
     let (Some(lit), Some(active)) = (lit, active) else { return };
     if viewpoint.awaits && render.is_some_and(|r| Some(r.camera()) == viewpoint.sent.as_ref()) {
@@ -134,7 +133,6 @@ pub(crate) fn adopt(
         look.exposure = active.0.exposure;
         look.order = None;
         picture.forget();
-        border.forget();
     }
     viewpoint.go(active.0.clone());
 }

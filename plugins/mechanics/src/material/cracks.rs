@@ -28,9 +28,7 @@
 //! Oliver and Cervera 1998). Cracks that are open across it weaken it (Vecchio and Collins 1986, see
 //! `softened`). Creep is driven by the stress before crushing.
 
-use super::law::{
-    CONFINED, Clock, Concrete, ROUNDS, Response, State, Step, crushing_stress, reach,
-};
+use super::law::{Clock, Concrete, ROUNDS, Response, State, Step, crushing_stress, reach};
 use super::softening::{Compression, Knee};
 use crate::tensor::{self, Frame, Principal, Tangent, Voigt, ZERO};
 
@@ -328,20 +326,6 @@ fn softened(found: &Found, axes: &Frame, along: &[f64; 3]) -> f64 {
     (1.0 / (0.8 + 0.34 * open / 0.002)).min(1.0)
 }
 
-/// By how much concrete that was crushed as far as `kappa` has swollen across the direction that
-/// presses most, beyond Poisson's ratio: microcracks along the load open, and the ratio grows from
-/// half of the strain at the peak on as ν (1 + 1.5 (2κ/ε_c1 − 1)²), up to .5 (Vecchio 1992 after
-/// Kupfer, Hilsdorf and Rüsch 1969). Nothing comes of it where it is free; hoops, plates and what is
-/// pressed less hold it, which confines it.
-fn swollen(nu: f64, kappa: f64, peak: f64, stress: &Principal) -> Voigt {
-    let over = (2.0 * kappa / peak - 1.0).max(0.0);
-    let swells = (1.5 * nu * over * over).min(0.5 - nu).max(0.0) * kappa;
-    if swells == 0.0 {
-        return ZERO;
-    }
-    Principal { values: [swells, swells, 0.0], ..*stress }.as_strain()
-}
-
 /// A point in a step.
 struct Point<'a> {
     clock: &'a Clock,
@@ -430,14 +414,12 @@ impl Concrete {
             &effective,
             &tensor::scale(&found.drive, creep / (self.elastic.modulus * clock.nonlinear)),
         );
-        let energy = 0.5 * tensor::dot(&response.stress, &mechanical) + found.cracked.stuck;
-        // What it swells now it is strained by in the next step.
-        let mechanical = match self.setting.swells {
-            true => tensor::sub(&mechanical, &tensor::sub(&response.state.swollen, &state.swollen)),
-            false => mechanical,
-        };
         let state = State { strain: *strain, mechanical, ..response.state };
-        Response { energy, state, ..response }
+        Response {
+            energy: 0.5 * tensor::dot(&response.stress, &mechanical) + found.cracked.stuck,
+            state,
+            ..response
+        }
     }
 
     /// The answer of a point without cracks and crushing that stays so, which is Hooke's and needs
@@ -537,13 +519,6 @@ impl Concrete {
         Found { damage, cracked, stress, drive, creep, share, asked }
     }
 
-    /// By how much concrete that is confined is more ductile: the strain at its peak grows as the
-    /// square of its strength (EN 1992-1-1 (3.26)), which the pressure across raises by 4 of it.
-    fn ductile(&self, stress: &Principal, state: &State) -> f64 {
-        let across = -stress.values[0].min(0.0) * (1.0 - state.damage[1]);
-        (1.0 + CONFINED * across / self.properties.fcm).powi(2)
-    }
-
     /// The answer, but for strain and energy.
     fn cracked_response(
         &self,
@@ -554,7 +529,7 @@ impl Concrete {
         step: &Step,
         growth: Option<f64>,
     ) -> Response {
-        let (p, e, nu) = (&self.properties, self.elastic.modulus, self.elastic.poisson);
+        let (p, e) = (&self.properties, self.elastic.modulus);
         let Point { clock, state, axes, laws, .. } = point;
         let principal = Principal::of_stress(&found.stress);
         let band = if state.bands[1] > 0.0 {
@@ -562,17 +537,8 @@ impl Concrete {
         } else {
             self.along(&principal.directions[2], step)
         };
-        let ductile = match self.setting.swells {
-            true => self.ductile(&principal, state),
-            false => 1.0,
-        };
-        let compression = Compression::of(
-            e,
-            clock.aged.fcm,
-            ductile * p.peak_strain,
-            ductile * p.crushing_energy,
-            band,
-        );
+        let compression =
+            Compression::of(e, clock.aged.fcm, p.peak_strain, p.crushing_energy, band);
         // Of the stress only what presses crushes; of creep all that goes with it.
         let pressing =
             Principal { values: principal.values.map(|s| s.min(0.0)), ..principal }.as_stress();
@@ -606,10 +572,6 @@ impl Concrete {
                     .increment
                     .advance(&state.history, &tensor::sub(&found.drive, &state.drive)),
                 drive: found.drive,
-                swollen: match self.setting.swells {
-                    true => swollen(nu, crushed_by, compression.peak, &principal),
-                    false => ZERO,
-                },
                 kappa: [largest(kappa), crushed_by],
                 pressed,
                 bands: [
@@ -694,53 +656,6 @@ mod tests {
                 let ratio = strongest(across) / whole;
                 assert!((ratio / expected - 1.0).abs() < 0.06, "{across} {ratio} {expected}");
             }
-        }
-    }
-
-    /// Pressed within hoops that yield at f_l of the concrete's section both ways: strength over
-    /// that without, and the strain there.
-    fn hooped(swells: bool, ratio: f64, yielding: f64) -> (f64, f64) {
-        let setting = Setting { cracks: Cracks::Planes, swells, ..Setting::short_term(0.2) };
-        let law = Concrete::new(c30(), setting).unwrap();
-        let mut state = law.born(0.0, 28.0 * DAY);
-        let (mut most, mut at) = (0.0_f64, 0.0);
-        let mut across = 0.0;
-        for k in 1..=1500 {
-            let down = -1e-5 * f64::from(k);
-            let mut answer = law.respond(&[across, across, down, 0.0, 0.0, 0.0], &state, &NOW);
-            // What the hoops bear grows with how far it moves outwards, what it presses falls.
-            let mut between = [-down * 0.1 - 1e-3, -down * 2.0];
-            for _ in 0..60 {
-                across = 0.5 * (between[0] + between[1]);
-                answer = law.respond(&[across, across, down, 0.0, 0.0, 0.0], &state, &NOW);
-                let hoop = ratio * (200e9 * across).clamp(-yielding, yielding);
-                between[usize::from(answer.stress[0] + hoop > 0.0)] = across;
-            }
-            state = answer.state;
-            if -answer.stress[2] > most {
-                (most, at) = (-answer.stress[2], -down);
-            }
-        }
-        (most / 38e6, at)
-    }
-
-    /// Hoops make concrete stronger and more ductile as EN 1992-1-1 (3.24) and (3.25) say of the
-    /// pressure at which they yield, within 12 %: 1 + 5 σ₂/f_c, from .05 on 1.125 + 2.5 σ₂/f_c.
-    /// Without swelling they hardly bear anything.
-    #[test]
-    fn hoops_confine_what_swells() {
-        let (bare, first) = hooped(true, 0.0, 400e6);
-        assert!((bare - 1.0).abs() < 1e-3);
-        for pressure in [0.025, 0.05, 0.1, 0.2_f64] {
-            let ratio = pressure * 38e6 / 400e6;
-            let code = (1.0 + 5.0 * pressure).min(1.125 + 2.5 * pressure);
-            let (strength, strain) = hooped(true, ratio, 400e6);
-            let (rigid, _) = hooped(false, ratio, 400e6);
-            println!(
-                "{pressure}: {strength} at {strain}, {code} by the code, not swelling {rigid}"
-            );
-            assert!((strength / code - 1.0).abs() < 0.12, "{pressure}: {strength} {code}");
-            assert!(strain > first * strength && rigid - 1.0 < 0.6 * (strength - 1.0));
         }
     }
 

@@ -48,9 +48,6 @@ pub struct Setting {
     pub cracks: Cracks,
     /// Whether planes that are open make concrete weaker along them (`cracks::softened`).
     pub transverse: bool,
-    /// Whether concrete that is being crushed swells across (`cracks::swollen`), so that hoops
-    /// confine it.
-    pub swells: bool,
     /// Creep and shrinkage, or none.
     pub creep: Option<Creep>,
     /// Creep by this chain, whatever `creep` says.
@@ -83,7 +80,6 @@ impl Setting {
             spread: None,
             cracks: Cracks::Diffuse,
             transverse: true,
-            swells: std::env::var_os("SWELL").is_some(),
             creep: None,
             chain: None,
             ageing: false,
@@ -119,8 +115,6 @@ pub struct State {
     pub strain: Voigt,
     /// Its mechanical part, in units of the modulus at 28 days.
     pub mechanical: Voigt,
-    /// By how much it has swollen while it was crushed ([`Cracks::Planes`]).
-    pub swollen: Voigt,
     /// Its creep.
     pub creep: Voigt,
     /// Kelvin units.
@@ -299,7 +293,6 @@ impl Concrete {
         State {
             strain: ZERO,
             mechanical: ZERO,
-            swollen: ZERO,
             creep: ZERO,
             history: History::default(),
             drive: ZERO,
@@ -455,7 +448,6 @@ impl Concrete {
         let state = State {
             strain: *strain,
             mechanical: split.mechanical(),
-            swollen: ZERO,
             creep: found.creep,
             history: clock.increment.advance(&state.history, &tensor::sub(&drive, &state.drive)),
             drive,
@@ -622,16 +614,12 @@ fn crushing_limit(stress: &Voigt) -> f64 {
     tensor::von_mises(stress) / (1.0 - ALPHA)
 }
 
-/// By how many times the pressure across it [`crushing_stress`] raises the strength: (1 + 2α + γ)/(1
-/// − α).
-pub(super) const CONFINED: f64 = (1.0 + 2.0 * ALPHA + GAMMA) / (1.0 - ALPHA);
-/// 3(1 − K_c)/(2K_c − 1) with K_c = .7.
-const GAMMA: f64 = 0.9 / 0.4;
-
 /// Lubliner's criterion (1989) of the compressive parts of principal stresses, largest first: the
 /// uniaxial compression that is as dangerous, Pa.
 #[must_use]
 pub(crate) fn crushing_stress(principal: [f64; 3]) -> f64 {
+    /// 3(1 − K_c)/(2K_c − 1) with K_c = .7.
+    const GAMMA: f64 = 0.9 / 0.4;
     let [a, b, c] = principal.map(|s| (-s).max(0.0));
     let mises = (0.5 * ((a - b).powi(2) + (b - c).powi(2) + (c - a).powi(2))).sqrt();
     let least = a.min(b).min(c);

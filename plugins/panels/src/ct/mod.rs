@@ -25,8 +25,8 @@ use source::{Read, Source};
 
 use crate::{
     Action, Actions, Selection,
-    album::{self, Leaf},
     lang::{drag, term},
+    leaf::{self, Leaf},
     members,
     workspace::Desk,
     zoom::Zoom,
@@ -133,7 +133,7 @@ impl Ct {
         let mut image = draw::grey(read, window);
         let labels = draw::labels(read, self.overlay);
         image.pixels.iter_mut().zip(labels.pixels).for_each(|(pixel, on)| *pixel = pixel.blend(on));
-        let what = album::said(scene, &format!("{}, {}", member.name, read.caption()));
+        let what = leaf::said(scene, &format!("{}, {}", member.name, read.caption()));
         let unit = unit(*origin);
         Some(Leaf {
             name: format!("ct-{}-slice {}", member.id, index + 1),

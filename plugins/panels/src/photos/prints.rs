@@ -5,8 +5,8 @@ use intrados_scene::Scene;
 
 use super::{Photos, sheet::FOUND, work::Find};
 use crate::{
-    album::{self, Leaf, on_ground},
     lang::term,
+    leaf::{self, Leaf, on_ground},
 };
 
 impl Photos {
@@ -21,11 +21,11 @@ impl Photos {
             let image = image.clone();
             Leaf {
                 name,
-                what: album::said(scene, &shown),
+                what: leaf::said(scene, &shown),
                 legend: None,
                 draw: Box::new(move || {
                     let mut image = on_ground(image, ground);
-                    lines.iter().for_each(|line| album::mark(&mut image, line, FOUND));
+                    lines.iter().for_each(|line| leaf::mark(&mut image, line, FOUND));
                     image
                 }),
             }

@@ -28,10 +28,9 @@ use intrados_stage::{
 use quantity::Quantity;
 
 use crate::{
-    Actions, Colours, Log, Look, Selection,
-    album::{Leaf, on_ground},
-    colours,
+    Actions, Colours, Log, Look, Selection, colours,
     lang::{drag, fixed, lines, local, slide, term},
+    leaf::{Leaf, on_ground},
     legend::Legend,
     members,
     number::significant,

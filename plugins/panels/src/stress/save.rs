@@ -9,7 +9,7 @@ use intrados_mechanics::{
     write::csv,
 };
 
-use crate::{album::on_ground, export::write_png, lang::fixed, legend::put_under};
+use crate::{export::write_png, lang::fixed, leaf::on_ground, legend::put_under};
 
 /// What is written, by the ending of the file's name.
 #[derive(Clone, Copy, PartialEq, Eq)]

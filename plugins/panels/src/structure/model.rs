@@ -14,10 +14,9 @@ use super::{
     spot::Spot,
 };
 use crate::{
-    Latest, Selection,
-    album::{Drawing, on_ground},
-    colours,
+    Latest, Selection, colours,
     lang::{fixed, local, term},
+    leaf::{Drawing, on_ground},
     legend::Legend,
     lengths,
     moment::{Seen, place as place_of},

@@ -13,9 +13,9 @@ use super::{
 };
 use crate::{
     Latest,
-    album::{self, Leaf},
     history::History,
     lang::term,
+    leaf::{self, Leaf},
     moment::{Courses, Moment, Seen},
     views::Views,
 };
@@ -77,7 +77,7 @@ impl Structure {
     fn leaf(&self, ui: &Ui, scene: &Scene, print: Print) -> Leaf {
         let Print { name, what, seen, scale, camera } = print;
         let width = camera.width as usize;
-        let what = album::said(scene, &what);
+        let what = leaf::said(scene, &what);
         let legend = scale.printed(vec![what.clone()]).drawn(ui, width);
         let draw = self.model.print(seen, scale, self.section, camera, model::ground(ui));
         Leaf { name, what, legend: Some(legend), draw }
