@@ -252,7 +252,7 @@ pub(crate) fn raise(
         }
         let [share, least] = match raised.to {
             Reach::Peak if !watch.waits() => PEAK_WORK,
-            Reach::Mode if !watch.waits() => MODE_WORK,
+            Reach::Mode if !watch.waits() && watch.has_told() => MODE_WORK,
             _ => WORK,
         };
         march.limit(at_peak + (share * at_peak).max(least));
@@ -442,6 +442,11 @@ impl<'a, 'm> Watch<'a, 'm> {
                 }
             }
         }
+    }
+
+    /// Whether something has happened already that tells how it fails.
+    fn has_told(&self) -> bool {
+        self.yielding.is_some() || self.curve.last().is_some_and(|now| self.has_fallen(now, FALLS))
     }
 
     /// Why it need not be followed any further.
