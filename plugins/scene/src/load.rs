@@ -33,7 +33,6 @@ pub fn bundled() -> &'static [(&'static str, &'static str)] {
         "column",
         "beam",
         "tunnel",
-        "tunnel-pipe",
         "specimens",
         "cornell",
         "room",
