@@ -520,7 +520,10 @@ impl<'a, 'm> Watch<'a, 'm> {
             .map(|(u, y)| u.displacement_m / y.displacement_m)
             .filter(|d| *d >= 1.0);
         let has_failed = after.iter().any(|p| self.has_fallen(p, FALLS));
-        let (mode, because) = self.mode(has_failed, job)?;
+        let (mode, mut because) = self.mode(has_failed, job)?;
+        if mode == Mode::None {
+            because = format!("{because}; {ended}");
+        }
         Ok(Strength {
             loads: self
                 .raised
@@ -549,8 +552,10 @@ impl<'a, 'm> Watch<'a, 'm> {
             return Ok((*mode, format!("{name} breaks")));
         }
         let has_failed = has_failed || broken.is_some();
-        let yielded =
-            self.yielding.as_ref().filter(|(y, _)| y.displacement_m <= peak.displacement_m);
+        // A peak may be that of the last crack, and bars yield right after it.
+        let is_before =
+            |y: &CurvePoint| y.displacement_m <= peak.displacement_m || !self.has_fallen(y, FALLS);
+        let yielded = self.yielding.as_ref().filter(|(y, _)| is_before(y));
         let after =
             yielded.map_or(String::new(), |(y, name)| format!("; {name} yields at {}", at(y)));
         let opened = self.opened();

@@ -294,7 +294,8 @@ fn cracked(bond: &str, element: f64) -> Outcome {
 /// against what cracks do. No bar yields.
 #[test]
 fn a_scene_with_slipping_bars_finds_its_equilibria() {
-    for element in [0.15, 0.1] {
+    // On coarser bricks, two over the depth, it is chance how many of them crack.
+    for element in [0.1, 0.075] {
         let [perfect, slipping] = ["Perfect", "Slip"].map(|bond| cracked(bond, element));
         for (bond, outcome) in [("perfect", &perfect), ("slip", &slipping)] {
             assert!(outcome.complaint.is_empty(), "{element}, {bond}: {}", outcome.complaint);
