@@ -54,10 +54,7 @@ pub(super) fn ties(model: &Model) -> Vec<Ties> {
                     let dense = share * steel.area / model.mesh.hex_volume(hex);
                     let tie = &mut ties[hex as usize];
                     tie.cracks[axis] += 5.4 * dense * along / steel.diameter();
-                    // Bars that slip make cracks where they are: each in a brick of its own.
-                    if steel.bond.is_none() {
-                        tie.yielding[axis] += dense * square * yielding;
-                    }
+                    tie.yielding[axis] += dense * square * yielding;
                 }
             }
         }
