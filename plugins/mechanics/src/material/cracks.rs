@@ -9,8 +9,9 @@
 //! Strain is that of Hooke's law and of each plane's crack. In the axes of the planes
 //!
 //! E εᵢ = σᵢ/(1 − dᵢ) − ν Σ σⱼ (j ≠ i) where σᵢ is tension, the same with dᵢ = 0 where it is
-//! compression (the crack is shut); G γᵢⱼ = τᵢⱼ (1 + sᵢ + sⱼ), sᵢ = dᵢ/(1 − dᵢ): what is not broken
-//! yet is as stiff along a crack as it is across.
+//! compression (the crack is shut); G γᵢⱼ = τᵢⱼ (1 + sᵢ + sⱼ), sᵢ = bᵢ/(1 − bᵢ), bᵢ being how far
+//! the plane is broken: what is not broken yet is as stiff along a crack as it is across (dᵢ = bᵢ),
+//! but for what bars hold together.
 //!
 //! It is the derivative of an energy convex in σ: strain has one stress, and dissipation is never
 //! negative; nor is it where planes turn, since stress and strain then have the same axes. Beside
@@ -23,11 +24,13 @@
 //! over the largest. (One damage for all directions is driven by the modified von Mises strain, by
 //! which pure shear cracks at √(k/3), some 1.9 of the tensile strength.)
 //! Bars keep cracks apart: a brick has as many as their bond makes, each with its own energy and
-//! width, be it larger than they are apart or smaller ([`Step::ties`]).
+//! width, be it larger than they are apart or smaller ([`Step::ties`]); between cracks their bond
+//! gives tension back, so that less is lost across a plane, dᵢ, than along it, sᵢ.
 //! Compression is crushed by the part of the stress that presses: σ = σ⁺ + (1 − d_c) σ⁻ (Faria,
 //! Oliver and Cervera 1998). Cracks that are open across it weaken it (Vecchio and Collins 1986, see
 //! `softened`). Creep is driven by the stress before crushing.
 
+use super::DAY;
 use super::law::{Clock, Concrete, ROUNDS, Response, State, Step, crushing_stress, reach};
 use super::softening::{Compression, Knee};
 use crate::tensor::{self, Frame, Principal, Tangent, Voigt, ZERO};
@@ -41,8 +44,10 @@ pub struct Planes {
     pub kappa: [f64; 3],
     /// The same as it was last.
     pub asked: [f64; 3],
-    /// Damage of each: it does not heal while the strength grows with age.
+    /// How far each is broken: it does not heal while the strength grows with age.
     pub damage: [f64; 3],
+    /// How much of what is pulled across each is lost: less where bars hold it together.
+    pub across: [f64; 3],
     /// Shear stress by interlock and friction on 12, 23 and 31, Pa.
     pub friction: [f64; 3],
     /// Shear strain by which it is locked.
@@ -51,6 +56,9 @@ pub struct Planes {
     pub fixed: bool,
 }
 
+/// In which time what bars give back between cracks falls towards what lasts, s: within some 20
+/// days it is there (Scott and Beeby 2005).
+const FADING: f64 = 7.0 * DAY;
 /// Friction of rough concrete on concrete (EN 1992-1-1 §6.2.5).
 const FRICTION: f64 = 0.7;
 /// Share of the tensile strength that compression as strong as f_c takes across (Kupfer, Hilsdorf
@@ -97,6 +105,7 @@ pub(crate) const SOUND: Planes = Planes {
     kappa: [0.0; 3],
     asked: [0.0; 3],
     damage: [0.0; 3],
+    across: [0.0; 3],
     friction: [0.0; 3],
     locked: [0.0; 3],
     fixed: false,
@@ -174,11 +183,19 @@ struct Cracked {
     stuck: f64,
 }
 
-/// Stress under `strain` (along the planes' axes) at their damages, if each unit of strain on the
-/// section brings `creep` more of it.
-fn solve(modulus: f64, nu: f64, strain: &Voigt, damage: [f64; 3], creep: f64) -> Cracked {
+/// How far planes are broken, and how much of what is pulled across them is lost.
+#[derive(Debug, Clone, Copy)]
+struct Lost {
+    damage: [f64; 3],
+    across: [f64; 3],
+}
+
+/// Stress under `strain` (along the planes' axes) at what they have lost, if each unit of strain on
+/// the section brings `creep` more of it.
+fn solve(modulus: f64, nu: f64, strain: &Voigt, lost: &Lost, creep: f64) -> Cracked {
     let q = 1.0 + creep;
-    let left = damage.map(|d| 1.0 - d);
+    let left = lost.across.map(|d| 1.0 - d);
+    let broken = lost.damage.map(|b| b / (1.0 - b));
     let pattern = |open: u8| {
         let is_open = |i: usize| (open >> i) & 1 == 1;
         let p: [f64; 3] = std::array::from_fn(|i| {
@@ -207,8 +224,7 @@ fn solve(modulus: f64, nu: f64, strain: &Voigt, damage: [f64; 3], creep: f64) ->
         }
     }
     for (k, (i, j)) in (3..).zip(PAIRS) {
-        tangent[k][k] =
-            0.5 * modulus / (1.0 + nu) / (q + damage[i] / left[i] + damage[j] / left[j]);
+        tangent[k][k] = 0.5 * modulus / (1.0 + nu) / (q + broken[i] + broken[j]);
     }
     let stress: Voigt =
         std::array::from_fn(|k| if k < 3 { normal[k] } else { tangent[k][k] * strain[k] });
@@ -218,7 +234,7 @@ fn solve(modulus: f64, nu: f64, strain: &Voigt, damage: [f64; 3], creep: f64) ->
         tangent,
         section: std::array::from_fn(|k| if open(k) { stress[k] / left[k] } else { stress[k] }),
         opening: std::array::from_fn(|i| {
-            if open(i) { normal[i] * damage[i] / (modulus * left[i]) } else { 0.0 }
+            if open(i) { normal[i] * lost.across[i] / (modulus * left[i]) } else { 0.0 }
         }),
         friction: [0.0; 3],
         locked: [0.0; 3],
@@ -340,11 +356,13 @@ struct Point<'a> {
     laws: [Knee; 3],
     bands: [f64; 3],
     creep: f64,
+    /// How much of what bars give back for a while only the step takes away.
+    lasting: f64,
 }
 
 /// What a point answers at given damage.
 struct Found {
-    damage: [f64; 3],
+    lost: Lost,
     cracked: Cracked,
     /// Before crushing, in the world's axes, Pa.
     stress: Voigt,
@@ -381,8 +399,13 @@ impl Concrete {
             false => before.turned(&effective),
         };
         let bands = axes.map(|n| step.ties.band(&n, self.along(&n, step), clock.aged.fctm));
-        let laws = bands.map(|band| {
-            Knee::of(self.elastic.modulus, clock.aged.fctm, self.properties.fracture_energy, band)
+        let laws = std::array::from_fn(|i| {
+            let (fctm, energy) = (clock.aged.fctm, self.properties.fracture_energy);
+            let law = Knee::of(self.elastic.modulus, fctm, energy, bands[i]);
+            match self.setting.bonded {
+                true => law.with(step.ties.held(&axes[i], fctm)),
+                false => law,
+            }
         });
         let creep = clock.creep(self.elastic.modulus);
         let strains =
@@ -398,6 +421,7 @@ impl Concrete {
             laws,
             bands,
             creep,
+            lasting: 1.0 - (-(step.to - step.from).max(0.0) / FADING).exp(),
         };
         let mut kappa = growth.map_or(before.kappa, |share| before.grown(share, &laws));
         let mut found = self.judge_planes(&point, kappa);
@@ -496,13 +520,20 @@ impl Concrete {
     fn judge_planes(&self, point: &Point, kappa: [f64; 3]) -> Found {
         let (e, nu) = (self.elastic.modulus, self.elastic.poisson);
         let Point { clock, state, axes, .. } = point;
-        let damage: [f64; 3] =
-            std::array::from_fn(|i| state.planes.damage[i].max(point.laws[i].damage(kappa[i])));
+        let (before, laws) = (&state.planes, &point.laws);
+        let lost = Lost {
+            damage: std::array::from_fn(|i| before.damage[i].max(laws[i].damage(kappa[i]))),
+            across: std::array::from_fn(|i| {
+                let [now, late] = [false, true].map(|lasted| laws[i].across(kappa[i], lasted));
+                let now = before.across[i].max(now);
+                now + point.lasting * (late - now).max(0.0)
+            }),
+        };
         let shear = 0.5 * e / ((1.0 + nu) * (1.0 + point.creep));
-        let cracked = solve(e, nu, &point.strain, damage, point.creep);
-        let cracked = match state.planes.fixed {
+        let cracked = solve(e, nu, &point.strain, &lost, point.creep);
+        let cracked = match before.fixed {
             false => cracked.turning(&point.strain),
-            true => cracked.rubbing(point, damage, shear),
+            true => cracked.rubbing(point, lost.damage, shear),
         };
         let stress = tensor::rotate_stress(&cracked.stress, &tensor::transposed(axes));
         let drive = tensor::scale(&tensor::elastic_strain(1.0, nu, &stress), clock.nonlinear);
@@ -516,7 +547,7 @@ impl Concrete {
             std::array::from_fn(
                 |i| if most > 0.0 { value * judged[i].max(0.0) / most } else { 0.0 },
             );
-        Found { damage, cracked, stress, drive, creep, share, asked }
+        Found { lost, cracked, stress, drive, creep, share, asked }
     }
 
     /// The answer, but for strain and energy.
@@ -578,7 +609,7 @@ impl Concrete {
                     if largest(kappa) > 0.0 { bands[widest] } else { 0.0 },
                     if crushed_by > compression.peak { band } else { 0.0 },
                 ],
-                damage: [largest(found.damage), damage],
+                damage: [largest(found.lost.damage), damage],
                 thermal: clock.thermal,
                 shrinkage: clock.shrinkage,
                 maturity: clock.maturity,
@@ -587,7 +618,8 @@ impl Concrete {
                     axes: *axes,
                     kappa,
                     asked: found.asked,
-                    damage: found.damage,
+                    damage: found.lost.damage,
+                    across: found.lost.across,
                     friction: found.cracked.friction,
                     locked: found.cracked.locked,
                     fixed,
@@ -607,7 +639,6 @@ impl Concrete {
 
 #[cfg(test)]
 mod tests {
-    use super::super::DAY;
     use super::super::Error;
     use super::super::concrete::{Class, Code, Given, Properties};
     use super::super::law::{Cracks, Setting, Ties};
@@ -684,7 +715,7 @@ mod tests {
     fn without_damage_it_is_hooke() {
         for walk in 0..100 {
             let strain = random(walk, 1e-3);
-            let found = solve(E, NU, &strain, [0.0; 3], 0.0);
+            let found = solve(E, NU, &strain, &Lost { damage: [0.0; 3], across: [0.0; 3] }, 0.0);
             assert!(
                 largest(&tensor::sub(
                     &found.stress,
@@ -699,9 +730,9 @@ mod tests {
     #[test]
     fn tangent_is_secant_and_that_of_finite_differences() {
         for walk in 0..100 {
-            let (strain, damage, creep) =
-                (random(walk, 1e-3), [0.99, 0.5, 0.0], if walk % 2 == 0 { 0.0 } else { 0.7 });
-            let found = solve(E, NU, &strain, damage, creep);
+            let (strain, creep) = (random(walk, 1e-3), if walk % 2 == 0 { 0.0 } else { 0.7 });
+            let lost = Lost { damage: [0.99, 0.5, 0.0], across: [0.9, 0.5, 0.0] };
+            let found = solve(E, NU, &strain, &lost, creep);
             assert!(
                 largest(&tensor::sub(&tensor::apply(&found.tangent, &strain), &found.stress))
                     < 1e-11 * E * 1e-3
@@ -710,7 +741,7 @@ mod tests {
                 let moved = |by: f64| {
                     let mut strain = strain;
                     strain[j] += by;
-                    solve(E, NU, &strain, damage, creep).stress
+                    solve(E, NU, &strain, &lost, creep).stress
                 };
                 let (up, down) = (moved(1e-9), moved(-1e-9));
                 for i in 0..6 {
@@ -846,11 +877,20 @@ mod tests {
     }
 
     /// Along random paths that do not crush damage never falls, and what is dissipated, ∫σ dε − ψ,
-    /// never falls.
+    /// never falls, also where bars hold cracks together.
     #[test]
     fn dissipation_is_never_negative() {
         let law = law();
-        for path in 0..30 {
+        let bars = [6e6, 2e6, 0.0];
+        let ties = Ties {
+            cracks: [8.0, 4.0, 0.0],
+            yielding: bars,
+            left: bars,
+            stiffness: bars.map(|yielding| 400.0 * yielding),
+            reached: [1.0, 0.5, 0.0],
+        };
+        for path in 0..40 {
+            let step = if path < 30 { NOW } else { Step { ties, ..NOW } };
             let mut state = law.born(0.0, 28.0 * DAY);
             let (mut work, mut dissipated, mut stress) = (0.0, 0.0, ZERO);
             for corner in 0..4 {
@@ -869,7 +909,7 @@ mod tests {
                         &start,
                         &tensor::scale(&tensor::sub(&goal, &start), f64::from(k) / 1000.0),
                     );
-                    let answer = law.respond(&strain, &state, &NOW);
+                    let answer = law.respond(&strain, &state, &step);
                     let mean = tensor::scale(&tensor::add(&answer.stress, &stress), 0.5);
                     work += tensor::dot(&mean, &tensor::sub(&strain, &state.strain));
                     let now = work - answer.energy;

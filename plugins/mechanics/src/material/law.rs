@@ -27,7 +27,7 @@ use super::concrete::{Aged, Properties};
 use super::cracks::{Planes, SOUND};
 use super::creep::{Creep, maturity_rate, nonlinear_factor};
 use super::damage::{Split, Unilateral};
-use super::softening::{Compression, ELASTIC, Tension};
+use super::softening::{Compression, ELASTIC, Held, Tension};
 use super::{DAY, Error, checked};
 use crate::tensor::{self, Equivalent, Principal, Tangent, Voigt, ZERO};
 
@@ -48,6 +48,8 @@ pub struct Setting {
     pub cracks: Cracks,
     /// Whether planes that are open make concrete weaker along them (`cracks::softened`).
     pub transverse: bool,
+    /// Whether bars give tension back to the concrete between its cracks ([`Ties::held`]).
+    pub bonded: bool,
     /// Creep and shrinkage, or none.
     pub creep: Option<Creep>,
     /// Creep by this chain, whatever `creep` says.
@@ -80,6 +82,7 @@ impl Setting {
             spread: None,
             cracks: Cracks::Diffuse,
             transverse: true,
+            bonded: true,
             creep: None,
             chain: None,
             ageing: false,
@@ -167,11 +170,27 @@ pub struct Ties {
     pub cracks: [f64; 3],
     /// What they bear when they yield, over the section of the concrete, Pa.
     pub yielding: [f64; 3],
+    /// What they have left of that before any load, Pa: less where they are stressed.
+    pub left: [f64; 3],
+    /// Their stiffness, over the same section, Pa.
+    pub stiffness: [f64; 3],
+    /// Share of the concrete that they reach.
+    pub reached: [f64; 3],
 }
+
+/// Mean tension between cracks over the strength, at once and under load that lasts (MC2010, table
+/// 7.6-2, stabilised cracking).
+const BETWEEN: [f64; 2] = [0.6, 0.4];
 
 impl Ties {
     /// No bars.
-    pub const NONE: Self = Self { cracks: [0.0; 3], yielding: [0.0; 3] };
+    pub const NONE: Self = Self {
+        cracks: [0.0; 3],
+        yielding: [0.0; 3],
+        left: [0.0; 3],
+        stiffness: [0.0; 3],
+        reached: [0.0; 3],
+    };
 
     /// The length along a unit direction that is there for one crack, m, in an element that reaches
     /// over `reach`, of concrete that bears `fctm` (Pa): as far apart as bond keeps cracks if bars
@@ -185,6 +204,20 @@ impl Ties {
         let bears: f64 = n.iter().zip(self.yielding).map(|(n, bears)| n * n * bears).sum();
         let share = (bears / fctm.max(1.0)).min(1.0);
         1.0 / (share * cracks + (1.0 - share) * cracks.max(1.0 / reach))
+    }
+
+    /// What their bond gives back to concrete of strength `fctm` (Pa) between cracks across a unit
+    /// direction.
+    #[must_use]
+    pub(super) fn held(&self, n: &[f64; 3], fctm: f64) -> Held {
+        let square = n.map(|n| n * n);
+        let reached: f64 = square.iter().zip(self.reached).map(|(n, share)| n * share).sum();
+        let over = 1.0 / fctm.max(1.0);
+        Held {
+            most: BETWEEN.map(|most| most * reached.min(1.0)),
+            yielding: std::array::from_fn(|a| square[a] * self.left[a] * over),
+            stiffness: std::array::from_fn(|a| square[a] * square[a] * self.stiffness[a] * over),
+        }
     }
 }
 
@@ -650,7 +683,11 @@ mod tests {
     /// weak ones do not, and along no bar an element has a crack of its own.
     #[test]
     fn bars_keep_cracks_apart_if_they_bear_what_the_concrete_bore() {
-        let ties = |yielding| Ties { cracks: [10.0, 0.0, 0.0], yielding: [yielding, 0.0, 0.0] };
+        let ties = |yielding| Ties {
+            cracks: [10.0, 0.0, 0.0],
+            yielding: [yielding, 0.0, 0.0],
+            ..Ties::NONE
+        };
         let band = |yielding, n: [f64; 3], reach| ties(yielding).band(&n, reach, 3e6);
         let (x, y) = ([1.0, 0.0, 0.0], [0.0, 1.0, 0.0]);
         for (yielding, n, reach, expected) in [

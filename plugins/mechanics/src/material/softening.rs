@@ -71,13 +71,37 @@ impl Tension {
 
 /// Tension by two straight lines, the code's curve of a crack (MC2010 §5.1.8.2): f_t at no opening,
 /// f_t/5 at w₁ = G_f/f_t, nothing at 5 w₁. Up to the knee microcracks grow, from there on one crack
-/// opens.
+/// opens. Beside it what bars give back to the concrete between cracks ([`Held`]).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Knee {
     /// Strain at the peak, f_t/E.
     pub threshold: f64,
     /// w₁/h.
     opened: f64,
+    held: Held,
+}
+
+/// Tension that bars' bond gives back to concrete between its cracks: in the mean a share β of its
+/// strength (MC2010, 7.6.4.4, table 7.6-2), and no more than the bars, which bear it at the crack
+/// beside what they bear in the mean, have left until they yield there (Vecchio and Collins 1986,
+/// eqs. 24 to 26): Σ ρᵢ cos²θᵢ (f_yᵢ − E_s κ cos²θᵢ).
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct Held {
+    /// β over the volume that bars reach, at once and after the load has lasted.
+    pub most: [f64; 2],
+    /// ρ cos²θ f_y of the bars along each axis, over the strength.
+    pub yielding: [f64; 3],
+    /// ρ cos⁴θ E_s of the same.
+    pub stiffness: [f64; 3],
+}
+
+impl Held {
+    /// Its stress over the strength at a strain across the crack.
+    fn stress(&self, kappa: f64, lasted: bool) -> f64 {
+        let bars = self.yielding.iter().zip(self.stiffness);
+        self.most[usize::from(lasted)]
+            .min(bars.map(|(yielding, e)| (yielding - e * kappa).max(0.0)).sum())
+    }
 }
 
 impl Knee {
@@ -86,7 +110,14 @@ impl Knee {
     #[must_use]
     pub(crate) fn of(e: f64, ft: f64, gf: f64, h: f64) -> Self {
         let threshold = ft / e;
-        Self { threshold, opened: (gf / (h * ft)).max(0.81 * threshold) }
+        let opened = (gf / (h * ft)).max(0.81 * threshold);
+        Self { threshold, opened, held: Held::default() }
+    }
+
+    /// The same beside what bars give back.
+    #[must_use]
+    pub(crate) fn with(self, held: Held) -> Self {
+        Self { held, ..self }
     }
 
     /// Strain at the knee.
@@ -98,9 +129,25 @@ impl Knee {
     /// d = 1 − (κ₀/κ) σ/f_t, where κ = κ₀ σ/f_t + w/h.
     #[must_use]
     pub(crate) fn damage(&self, kappa: f64) -> f64 {
-        if kappa <= self.threshold {
-            return 0.0;
+        self.lost(kappa, self.softened(kappa))
+    }
+
+    /// The same of what is pulled across the crack, which bars hold together; its faces, and so
+    /// shear along them, know nothing of that.
+    #[must_use]
+    pub(crate) fn across(&self, kappa: f64, lasted: bool) -> f64 {
+        self.lost(kappa, self.softened(kappa).max(self.held.stress(kappa, lasted)))
+    }
+
+    fn lost(&self, kappa: f64, stress: f64) -> f64 {
+        match kappa <= self.threshold {
+            true => 0.0,
+            false => (1.0 - self.threshold / kappa * stress).min(MAX_DAMAGE),
         }
+    }
+
+    /// What the crack itself transfers, over f_t.
+    fn softened(&self, kappa: f64) -> f64 {
         let stress = match kappa < self.knee() {
             true => 1.0 - 0.8 * (kappa - self.threshold) / (self.opened - 0.8 * self.threshold),
             false => {
@@ -108,7 +155,7 @@ impl Knee {
                     / (self.opened - 0.05 * self.threshold)
             }
         };
-        (1.0 - self.threshold / kappa * stress.max(0.0)).min(MAX_DAMAGE)
+        stress.max(0.0)
     }
 }
 
@@ -251,6 +298,35 @@ mod tests {
             assert!((stress(law.knee()) / ft - 0.2).abs() < 1e-9);
             assert!((law.knee() - 0.2 * ft / e - gf / (h * ft)).abs() < 1e-12);
         }
+    }
+
+    /// Bars of 1 % hold .6 f_t until what is left up to their yielding is less, and nothing once
+    /// they yield; weak ones hold what they bear. Damage never falls.
+    #[test]
+    fn bars_hold_until_they_yield() {
+        let (e, ft) = (30e9, 3e6);
+        let law = |dense: f64| {
+            let held = Held {
+                most: [0.6, 0.4],
+                yielding: [dense * 500e6 / ft, 0.0, 0.0],
+                stiffness: [dense * 200e9 / ft, 0.0, 0.0],
+            };
+            Knee::of(e, ft, 100.0, 0.1).with(held)
+        };
+        let stress =
+            |dense: f64, kappa: f64| (1.0 - law(dense).across(kappa, false)) * e * kappa / ft;
+        // 5 MPa at the crack, of which 2 κ/.001 are used.
+        for (kappa, expected) in
+            [(5e-4, 0.6), (1.5e-3, 0.6), (2e-3, 1.0 / 3.0), (2.4e-3, 0.2 / 3.0)]
+        {
+            assert!((stress(0.01, kappa) / expected - 1.0).abs() < 1e-9, "{kappa}");
+        }
+        assert!(stress(0.01, 2.6e-3) < 1e-3 && stress(0.002, 1.5e-3) < 0.134);
+        assert!(((1.0 - law(0.01).across(1e-3, true)) * e * 1e-3 / ft / 0.4 - 1.0).abs() < 1e-9);
+        let soft = |kappa: f64| (1.0 - law(0.01).damage(kappa)) * e * kappa / ft;
+        assert!((stress(0.01, 2e-4) / soft(2e-4) - 1.0).abs() < 1e-9 && soft(2e-3) < 1e-3);
+        let damages = |k: i32| law(0.01).across(1e-5 * f64::from(k), false);
+        assert!((1..400).all(|k| damages(k + 1) >= damages(k)));
     }
 
     #[test]

@@ -25,6 +25,8 @@ const REACH: f64 = 7.5;
 const SQUARE: f64 = 0.99;
 /// Cosine from which on a face's normal runs along a bar: it is where the bar ends.
 const ALONG: f64 = 0.7;
+/// Cosine down to which a bar holds together what cracks across an axis.
+const OBLIQUE: f64 = 0.3;
 /// Pieces of a bar are looked at together up to so many diameters.
 const STRETCH: f64 = 3.0;
 
@@ -36,7 +38,10 @@ pub(super) fn ties(model: &Model) -> Vec<Ties> {
     let mut ties = vec![Ties::NONE; model.mesh.hexes.len()];
     let bars = || {
         model.steel.iter().filter_map(|steel| match &steel.kind {
-            SteelKind::Bar(bar) | SteelKind::Stressed(bar, _) => Some((steel, bar.yielding)),
+            SteelKind::Bar(bar) => Some((steel, bar, 0.0)),
+            SteelKind::Stressed(bar, stress) => {
+                Some((steel, bar, stress.iter().copied().fold(0.0, f64::max)))
+            }
             SteelKind::Tendon(_) => None,
         })
     };
@@ -45,19 +50,29 @@ pub(super) fn ties(model: &Model) -> Vec<Ties> {
     }
     let neighbours = model.mesh.neighbours();
     let surface = surface(model);
-    for (steel, yielding) in bars() {
+    // Which points of a brick are reached along each axis, a bit each.
+    let mut reached = vec![[0_u8; 3]; ties.len()];
+    for (steel, bar, stressed) in bars() {
         for stretch in stretches(steel, STRETCH * steel.diameter()) {
             let reach = (REACH * steel.diameter()).min(DEEP * beside(&surface, stretch));
             let zone = Zone::about(model, &neighbours, stretch, reach);
             for (axis, along, square) in (0..3).map(|axis| lengths(stretch, axis)) {
-                for &(hex, share) in &zone.0 {
-                    let dense = share * steel.area / model.mesh.hex_volume(hex);
-                    let tie = &mut ties[hex as usize];
+                for part in &zone.0 {
+                    let dense = part.share * steel.area / model.mesh.hex_volume(part.hex);
+                    let tie = &mut ties[part.hex as usize];
                     tie.cracks[axis] += 5.4 * dense * along / steel.diameter();
-                    tie.yielding[axis] += dense * square * yielding;
+                    tie.yielding[axis] += dense * square * bar.yielding;
+                    tie.left[axis] += dense * square * (bar.yielding - stressed).max(0.0);
+                    tie.stiffness[axis] += dense * square * bar.modulus;
+                    if square > OBLIQUE * along {
+                        reached[part.hex as usize][axis] |= part.points;
+                    }
                 }
             }
         }
+    }
+    for (tie, points) in ties.iter_mut().zip(reached) {
+        tie.reached = points.map(|points| f64::from(points.count_ones()) / 8.0);
     }
     ties
 }
@@ -117,8 +132,16 @@ fn lengths(pieces: &[Piece], axis: usize) -> (usize, f64, f64) {
     (axis, once, twice)
 }
 
-/// Bricks about a stretch of a bar, and what share of it is theirs.
-struct Zone(Vec<(u32, f64)>);
+/// Bricks about a stretch of a bar.
+struct Zone(Vec<Part>);
+
+/// A brick, what share of the stretch is its own, and which of its points lie in the zone, a bit
+/// each.
+struct Part {
+    hex: u32,
+    share: f64,
+    points: u8,
+}
 
 impl Zone {
     fn about(
@@ -143,13 +166,15 @@ impl Zone {
                 let [along, apart] = axis.place(**point);
                 apart <= reach && low <= along && along <= high
             };
-            let points = points(model, hex).iter().filter(within).count();
+            let all = points(model, hex);
+            let reached = (0..).zip(&all).filter(|(_, point)| within(point));
+            let points = reached.fold(0, |points, (k, _)| points | (1_u8 << k));
             if points == 0 {
                 continue;
             }
-            let weight = points as f64 * model.mesh.hex_volume(hex);
-            whole += weight;
-            near.push((hex, weight));
+            let share = f64::from(points.count_ones()) * model.mesh.hex_volume(hex);
+            whole += share;
+            near.push(Part { hex, share, points });
             for next in neighbours[hex as usize].iter().flatten() {
                 if concrete(*next) && seen.insert(*next) {
                     queue.push(*next);
@@ -157,12 +182,16 @@ impl Zone {
             }
         }
         if whole > 0.0 {
-            return Self(near.into_iter().map(|(hex, weight)| (hex, weight / whole)).collect());
+            near.iter_mut().for_each(|part| part.share /= whole);
+            return Self(near);
         }
-        // Bricks much larger than the zone: the bar's own.
-        let length: f64 = stretch.iter().map(Piece::length).sum();
-        let own =
-            |piece: &Piece| (piece.host as u32, piece.length() / length.max(f64::MIN_POSITIVE));
+        // Bricks much larger than the zone: the bar's own, which holds none of their points.
+        let length = stretch.iter().map(Piece::length).sum::<f64>().max(f64::MIN_POSITIVE);
+        let own = |piece: &Piece| Part {
+            hex: piece.host as u32,
+            share: piece.length() / length,
+            points: 0,
+        };
         Self(stretch.iter().map(own).collect())
     }
 }

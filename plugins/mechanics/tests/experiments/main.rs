@@ -214,6 +214,7 @@ fn jacked(text: &str, element: Option<f64>, watch: &mut impl Observer) -> Outcom
     for body in &mut prepared.model.bodies {
         if let Matter::Concrete(mix) = &mut body.matter {
             mix.1.transverse = std::env::var_os("EXPERIMENT_UNSOFTENED").is_none();
+            mix.1.bonded = std::env::var_os("EXPERIMENT_UNBONDED").is_none();
         }
     }
     analyze(&prepared, MarchSettings::of_life(), &Job::default(), watch).unwrap().0
