@@ -296,6 +296,29 @@ fn all_groups_that_do_not_fit_are_named_at_once() {
         assert!(error.contains(part), "{part}: {error}");
     }
     assert_eq!(error.lines().count(), 1, "{error}");
+    // Values beside names, and all names where a material's is wrong; no more, since it is not known
+    // what is solid.
+    let wrong = BAR
+        .replace("modulus_gpa: 30", "modulus_gpa: 30e9")
+        .replace("\"core\"", "\"kern\"")
+        .replace("\"foot\"", "\"fuss\"")
+        + ", loads: [(group: \"tip\", action: Pressure(pressure_kpa: 1)), (group: \"head\", action: Pressure(pressure_kpa: inf)), (action: Force(force_kn: (0, 0, 1)))]";
+    let error = deck(&body, &wrong).unwrap_err();
+    for part in [
+        "a.groups.ron: materials[0].modulus_gpa is 30000000000.0",
+        "loads[1].pressure_kpa is inf",
+        "loads[2] needs a group",
+        "materials[0]: no physical group \"kern\"",
+        "element 1 and 1 more are in no volume",
+        "supports[0]: no physical group \"fuss\"",
+        "loads[0]: \"tip\" is a point, and needed is a surface",
+    ] {
+        assert!(error.contains(part), "{part}: {error}");
+    }
+    assert!(!error.contains("belong to no solid"), "{error}");
+    // Where only values are wrong, what rests on the solids is looked at, too.
+    let error = deck(&body, &said.replace("modulus_gpa: 30", "modulus_gpa: 0")).unwrap_err();
+    assert!(error.contains("modulus_gpa is 0.0") && error.contains("no density_kg_m3"), "{error}");
     // What is of two materials, and of none.
     let twice = BAR.replace("materials: [", "materials: [(modulus_gpa: 1, poisson: 0), ")
         + ", loads: [(action: Temperature(uniform_k: 1))]";
