@@ -46,6 +46,10 @@ def dependencies(manifest, kind):
     return own + [d for target in manifest.get("target", {}).values() for d in target.get(kind, {})]
 
 
+def is_published(crate):
+    return "publish" not in tomllib.loads((folder(crate) / "Cargo.toml").read_text())["package"]
+
+
 order = table()
 known = {p.parent.name for p in (ROOT / "plugins").glob("*/Cargo.toml")}
 faults += [f"ARCHITECTURE.md: plugins/{crate} is not in the table of crates" for crate in sorted(known - set(order))]
@@ -55,6 +59,8 @@ for place, crate in enumerate(order):
     for dependency in dependencies(manifest, "dependencies"):
         if dependency.startswith("intrados") and dependency not in before:
             faults.append(f"{crate}/Cargo.toml: {dependency} does not stand before {crate} in ARCHITECTURE.md")
+        if is_published(crate) and dependency.startswith("intrados") and not is_published(dependency.removeprefix("intrados-")):
+            faults.append(f"{crate}/Cargo.toml: {dependency} is not published, and {crate} is")
         for side in BESIDE:
             if crate in side and dependency in {name(c) for c in side}:
                 faults.append(f"{crate}/Cargo.toml: {dependency} stands beside {crate}, and neither may import the other")

@@ -9,7 +9,7 @@ use glam::DVec3;
 
 use super::{
     element::Element,
-    groups::{Action, Groups, Material as Given},
+    groups::{Action, Groups, Load, Material as Given, Support},
     law::{Elastic, Expansion, Table},
     mesh::MAX_COUNT,
     model::{Cell, Deck, Material, Pull, Step},
@@ -27,8 +27,8 @@ const ANY: &[u8] = &[0, 1, 2, 3];
 /// errors call it, and units are those of its lengths.
 ///
 /// # Errors
-/// What is damaged or not computed in the mesh; or all groups that are not there, that are no place
-/// of what is said of them, or of which too little is said. In one line.
+/// What is damaged or not computed in the mesh; or all values that cannot be, and all groups that
+/// are not there, no place of what is said of them, or of which too little is said. In one line.
 pub fn parse_mesh(
     bytes: &[u8],
     name: &Path,
@@ -72,6 +72,25 @@ fn shape(nodes: usize) -> Option<Shape> {
     })
 }
 
+/// Of which dimension a group is that a load acts on.
+fn acted_on(action: &Action) -> &'static [u8] {
+    match action {
+        Action::Pressure { .. } | Action::Traction { .. } => &[2],
+        Action::Force { .. } => &[0, 1, 2],
+        Action::Weight { .. } => VOLUMES,
+        Action::Temperature { .. } => ANY,
+    }
+}
+
+/// A physical group of which something is said.
+struct Group<'a> {
+    /// Where that is said, for messages.
+    place: String,
+    name: &'a str,
+    /// Its elements; none where there is no such group, which is a fault.
+    elements: Vec<u32>,
+}
+
 struct Builder<'a> {
     elements: Vec<gmsh::Element>,
     named: BTreeMap<(u8, String), Vec<u32>>,
@@ -112,18 +131,28 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// All of it. What rests on what solids are made of comes after that.
+    /// All of it. What rests on what solids are made of comes after that, but for its names.
     fn deck(mut self) -> Result<Deck, Fault> {
+        let Groups { supports, loads, .. } = self.groups;
+        self.faults = self.groups.faults();
+        let before = self.faults.len();
         self.solids();
-        Fault::all(std::mem::take(&mut self.faults))?;
-        self.surfaces();
-        for i in 0..self.groups.supports.len() {
-            self.support(i);
+        let are_made = self.faults.len() == before;
+        let named =
+            |(i, s): (usize, &'a Support)| self.group(format!("supports[{i}]"), &s.group, ANY);
+        let held: Vec<Group> = supports.iter().enumerate().map(named).collect();
+        let named = |(i, l): (usize, &'a Load)| {
+            Some(self.group(format!("loads[{i}]"), l.group.as_deref()?, acted_on(&l.action)))
+        };
+        let loaded: Vec<Option<Group>> = loads.iter().enumerate().map(named).collect();
+        if are_made {
+            self.surfaces();
+            supports.iter().zip(&held).for_each(|(support, group)| self.support(support, group));
+            for (i, (load, group)) in loads.iter().zip(&loaded).enumerate() {
+                self.load(&format!("loads[{i}]"), load.action, group.as_ref());
+            }
+            self.swelling();
         }
-        for (i, load) in self.groups.loads.iter().enumerate() {
-            self.load(&format!("loads[{i}]"), load.group.as_deref(), load.action);
-        }
-        self.swelling();
         Fault::all(self.faults)?;
         let idle = self.named.keys().filter(|key| !self.used.contains(*key));
         self.deck.notes.extend(idle.map(|(dimension, name)| {
@@ -137,8 +166,8 @@ impl<'a> Builder<'a> {
         self.faults.push(Fault::whole(format!("{place}: {why}")));
     }
 
-    /// Elements of the physical group of that name, which must have one of these dimensions.
-    fn group(&mut self, place: &str, name: &str, dimensions: &[u8]) -> Vec<u32> {
+    /// The physical group of that name, which must have one of these dimensions.
+    fn group(&mut self, place: String, name: &'a str, dimensions: &[u8]) -> Group<'a> {
         let key = |dimension: u8| (dimension, name.to_owned());
         let found: Vec<u8> =
             ANY.iter().copied().filter(|&d| self.named.contains_key(&key(d))).collect();
@@ -150,7 +179,8 @@ impl<'a> Builder<'a> {
         let why = match (found.as_slice(), fit.as_slice()) {
             (_, &[one]) => {
                 self.used.insert(key(one));
-                return self.named.get(&key(one)).cloned().unwrap_or_default();
+                let elements = self.named.get(&key(one)).cloned().unwrap_or_default();
+                return Group { place, name, elements };
             }
             ([], _) => format!("no physical group {}; the mesh has {}", quote(name), self.known()),
             (_, []) => format!(
@@ -165,8 +195,8 @@ impl<'a> Builder<'a> {
                 words(&fit).replace(" or ", " and a ")
             ),
         };
-        self.fault(place, &why);
-        Vec::new()
+        self.fault(&place, &why);
+        Group { place, name, elements: Vec::new() }
     }
 
     /// Names of the groups of the mesh.
@@ -192,7 +222,7 @@ impl<'a> Builder<'a> {
         for (i, given) in self.groups.materials.iter().enumerate() {
             let place = format!("materials[{i}]");
             let all = match &given.group {
-                Some(name) => self.group(&place, name, VOLUMES),
+                Some(name) => self.group(place.clone(), name, VOLUMES).elements,
                 None => solids.clone(),
             };
             let twice = all.iter().find_map(|&e| Some((e, of[e as usize]?)));
@@ -244,12 +274,11 @@ impl<'a> Builder<'a> {
     }
 
     /// Nodes of solids in a group, or of all solids.
-    fn nodes(&mut self, place: &str, group: Option<&str>) -> Vec<u32> {
-        let Some(name) = group else {
+    fn nodes(&mut self, group: Option<&Group>) -> Vec<u32> {
+        let Some(Group { place, name, elements }) = group else {
             let count = self.is_solid.len() as u32;
             return (0..count).filter(|&n| self.is_solid[n as usize]).collect();
         };
-        let elements = self.group(place, name, ANY);
         let all = elements.iter().flat_map(|&e| &self.elements[e as usize].nodes).copied();
         let nodes: BTreeSet<u32> = all.filter(|&n| self.is_solid[n as usize]).collect();
         if nodes.is_empty() && !elements.is_empty() {
@@ -258,9 +287,8 @@ impl<'a> Builder<'a> {
         nodes.into_iter().collect()
     }
 
-    fn support(&mut self, i: usize) {
-        let (place, support) = (format!("supports[{i}]"), &self.groups.supports[i]);
-        let nodes = self.nodes(&place, Some(&support.group));
+    fn support(&mut self, support: &Support, group: &Group) {
+        let nodes = self.nodes(Some(group));
         let mut torn = None;
         for ((axis, is_held), moved) in (0u8..).zip(support.axes()).zip(support.moved_mm) {
             let value = 1e-3 * moved;
@@ -271,40 +299,43 @@ impl<'a> Builder<'a> {
         }
         if let Some(node) = torn {
             let label = self.deck.labels[node as usize];
-            self.fault(&place, &format!("node {label} is moved elsewhere by another support"));
+            let why = format!("node {label} is moved elsewhere by another support");
+            self.fault(&group.place, &why);
         }
     }
 
-    fn load(&mut self, place: &str, group: Option<&str>, action: Action) {
-        let name = group.unwrap_or_default();
-        match action {
-            Action::Pressure { pressure_kpa } => {
-                for (cell, face) in self.sides(place, name, true) {
+    /// What acts on a group, or on all solids.
+    fn load(&mut self, place: &str, action: Action, group: Option<&Group>) {
+        match (action, group) {
+            (Action::Pressure { pressure_kpa }, Some(group)) => {
+                for (cell, face) in self.sides(group, true) {
                     let at = (cell, face as u8);
                     *self.step.pressures.entry(at).or_default() += 1e3 * pressure_kpa;
                 }
             }
-            Action::Traction { traction_kpa } => {
-                let faces = self.sides(place, name, false);
+            (Action::Traction { traction_kpa }, Some(group)) => {
+                let faces = self.sides(group, false);
                 self.pull(&faces, 1e3 * DVec3::from_array(traction_kpa));
             }
-            Action::Force { force_kn } => {
-                self.force(place, name, 1e3 * DVec3::from_array(force_kn));
+            (Action::Force { force_kn }, Some(group)) => {
+                self.force(group, 1e3 * DVec3::from_array(force_kn));
             }
-            Action::Weight { gravity_m_s2 } => {
+            (Action::Weight { gravity_m_s2 }, _) => {
                 self.weight(place, group, DVec3::from_array(gravity_m_s2));
             }
-            Action::Temperature { uniform_k } => {
-                let nodes = self.nodes(place, group);
+            (Action::Temperature { uniform_k }, _) => {
+                let nodes = self.nodes(group);
                 self.step.warm.resize(self.deck.nodes.len(), 0.0);
                 nodes.into_iter().for_each(|n| self.step.warm[n as usize] = uniform_k);
             }
+            // That it needs a group has been said.
+            (_, None) => {}
         }
     }
 
     /// Faces of solids that a physical surface is, each once; a pressure asks for those `outside`.
-    fn sides(&mut self, place: &str, name: &str, outside: bool) -> Vec<(u32, usize)> {
-        let elements = self.group(place, name, &[2]);
+    fn sides(&mut self, group: &Group, outside: bool) -> Vec<(u32, usize)> {
+        let Group { place, name, elements } = group;
         let all: BTreeSet<Corners> =
             elements.iter().map(|&e| corners(&self.elements[e as usize].nodes)).collect();
         let (mut faces, mut bare, mut inner) = (Vec::new(), 0, 0);
@@ -344,11 +375,11 @@ impl<'a> Builder<'a> {
     }
 
     /// Spreads a force (N) over a surface by area, over a line by length, over points alike.
-    fn force(&mut self, place: &str, name: &str, force: DVec3) {
-        let elements = self.group(place, name, &[0, 1, 2]);
+    fn force(&mut self, group: &Group, force: DVec3) {
+        let Group { place, name, elements } = group;
         let Some(first) = elements.first() else { return };
         if self.elements[*first as usize].dimension == 2 {
-            let faces = self.sides(place, name, false);
+            let faces = self.sides(group, false);
             let area = faces.iter().map(|&(cell, face)| {
                 let element = Element::new(&self.deck, &self.step, cell as usize);
                 element.face_points(face).iter().map(|p| p.1.length()).sum::<f64>()
@@ -390,12 +421,9 @@ impl<'a> Builder<'a> {
         }
     }
 
-    fn weight(&mut self, place: &str, group: Option<&str>, acceleration: DVec3) {
+    fn weight(&mut self, place: &str, group: Option<&Group>, acceleration: DVec3) {
         let cells: Vec<u32> = match group {
-            Some(name) => {
-                let elements = self.group(place, name, VOLUMES);
-                elements.into_iter().filter_map(|e| self.cells[e as usize]).collect()
-            }
+            Some(group) => group.elements.iter().filter_map(|&e| self.cells[e as usize]).collect(),
             None => (0..self.deck.cells.len() as u32).collect(),
         };
         self.lacks(place, &cells, |m| m.density.is_none(), "weight", "density_kg_m3");

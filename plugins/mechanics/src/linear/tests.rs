@@ -7,7 +7,10 @@ use super::{mesh, parse, read::Kind, shape::Shape, solve::Solved};
 use crate::{
     deck::Case,
     model::MarchSettings,
-    read::{Units, abaqus},
+    read::{
+        Units, abaqus,
+        solids::{self, HEX, TET, WEDGE},
+    },
 };
 
 /// The body's law in all tests.
@@ -35,80 +38,28 @@ struct Body {
 }
 
 impl Body {
-    fn node(&mut self, at: DVec3) -> usize {
-        match self.nodes.iter().position(|n| n.distance(at) < 1e-9) {
-            Some(known) => known,
-            None => {
-                self.nodes.push(at);
-                self.nodes.len() - 1
-            }
-        }
-    }
-
     /// An element by its corners; middles of edges are where its shape has them.
     fn element(&mut self, shape: Shape, corners: &[DVec3]) {
         let edges: &[[usize; 2]] = match shape {
-            Shape::Hex20 | Shape::Hex20Reduced => &[
-                [0, 1],
-                [1, 2],
-                [2, 3],
-                [3, 0],
-                [4, 5],
-                [5, 6],
-                [6, 7],
-                [7, 4],
-                [0, 4],
-                [1, 5],
-                [2, 6],
-                [3, 7],
-            ],
-            Shape::Tet10 => &[[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]],
-            Shape::Wedge15 => {
-                &[[0, 1], [1, 2], [2, 0], [3, 4], [4, 5], [5, 3], [0, 3], [1, 4], [2, 5]]
-            }
+            Shape::Hex20 | Shape::Hex20Reduced => HEX.abaqus,
+            Shape::Tet10 => TET.abaqus,
+            Shape::Wedge15 => WEDGE.abaqus,
             _ => &[],
         };
-        let middles = edges.iter().map(|&[a, b]| 0.5 * (corners[a] + corners[b]));
-        let places: Vec<DVec3> = corners.iter().copied().chain(middles).collect();
-        let nodes = places.into_iter().map(|p| self.node(p)).collect();
+        let nodes = solids::element(&mut self.nodes, corners, edges);
         self.elements.push(nodes);
     }
 
-    /// A box from `low` to `high` of elements of a type, so many along each axis.
-    fn fill(&mut self, kind: &str, [low, high]: [DVec3; 2], parts: [usize; 3]) -> Shape {
+    /// A box of elements of a type, so many along each axis.
+    fn fill(&mut self, kind: &str, within: [DVec3; 2], parts: [u32; 3]) -> Shape {
         let Some(Kind::Solid(shape)) = mesh::kind(kind) else { panic!("{kind} is no solid") };
-        let size = (high - low) / DVec3::from_array(parts.map(|n| n as f64));
-        for (i, j, k) in (0..parts[2])
-            .flat_map(|k| (0..parts[1]).flat_map(move |j| (0..parts[0]).map(move |i| (i, j, k))))
-        {
-            let at = |[a, b, c]: [usize; 3]| {
-                low + size * DVec3::new((i + a) as f64, (j + b) as f64, (k + c) as f64)
-            };
-            let corners = [
-                [0, 0, 0],
-                [1, 0, 0],
-                [1, 1, 0],
-                [0, 1, 0],
-                [0, 0, 1],
-                [1, 0, 1],
-                [1, 1, 1],
-                [0, 1, 1],
-            ]
-            .map(at);
-            let parts: &[&[usize]] = match shape.nodes() {
-                8 | 20 => &[&[0, 1, 2, 3, 4, 5, 6, 7]],
-                6 | 15 => &[&[0, 1, 2, 4, 5, 6], &[0, 2, 3, 4, 6, 7]],
-                // Kuhn's six tetrahedra about the diagonal from 0 to 6.
-                _ => &[
-                    &[0, 1, 2, 6],
-                    &[0, 2, 3, 6],
-                    &[0, 3, 7, 6],
-                    &[0, 7, 4, 6],
-                    &[0, 4, 5, 6],
-                    &[0, 5, 1, 6],
-                ],
-            };
-            for part in parts {
+        let cut = match shape.nodes() {
+            8 | 20 => HEX,
+            6 | 15 => WEDGE,
+            _ => TET,
+        };
+        for (_, corners) in solids::bricks(within, parts) {
+            for part in cut.parts {
                 let corners: Vec<DVec3> = part.iter().map(|&c| corners[c]).collect();
                 self.element(shape, &corners);
             }

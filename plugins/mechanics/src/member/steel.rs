@@ -22,7 +22,7 @@ use crate::{
         durability::{Attack, Corrosion, CorrosionError},
         steel::{Bar, Relaxation, Strand},
     },
-    mesh::{HexFace, Locator, Mesh, voxel::distance::Triangles},
+    mesh::{Locator, Mesh, voxel::distance::Triangles},
     model::{Matter, Rust, Slipping, Steel, SteelKind, Tendon},
     prestress::{self, Jack, Path},
 };
@@ -226,11 +226,7 @@ impl Draft<'_> {
             });
             sides
         };
-        let halves = |face: HexFace| {
-            let [a, b, c, d] = mesh.face(face).map(|n| mesh.nodes[n as usize]);
-            [[a, b, c], [a, c, d]]
-        };
-        let surface = Triangles::new(faces.into_iter().flat_map(halves).collect());
+        let surface = Triangles::of_faces(mesh, faces);
         Ok(Some(Skin { surface, corrosion: corrosion.clone(), begin: self.birth() }))
     }
 

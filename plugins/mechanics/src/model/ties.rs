@@ -87,12 +87,7 @@ fn surface(model: &Model) -> Triangles {
         normal.abs()[axis] > SQUARE
             && mesh.face(face).iter().all(|&node| held.contains(&(node, axis as u8)))
     };
-    let halves = |face| {
-        let [a, b, c, d] = mesh.face(face).map(|n| mesh.nodes[n as usize]);
-        [[a, b, c], [a, c, d]]
-    };
-    let faces = mesh.outer_faces().into_iter().filter(|&face| !goes_on(face));
-    Triangles::new(faces.flat_map(halves).collect())
+    Triangles::of_faces(mesh, mesh.outer_faces().into_iter().filter(|&face| !goes_on(face)))
 }
 
 /// How far the surface beside a stretch of a bar is from it, m.

@@ -9,6 +9,8 @@
 pub mod abaqus;
 mod deck;
 pub(crate) mod gmsh;
+#[cfg(test)]
+pub(crate) mod solids;
 
 use std::{
     path::{Path, PathBuf},

@@ -1,12 +1,14 @@
-//! Boxes as Gmsh meshes, by closed forms. Middles of edges are numbered as Gmsh's manual has them,
-//! not by way of what is tested.
+//! Boxes as Gmsh meshes, by closed forms.
 
 use std::fmt::Write as _;
 
 use intrados_stage::Job;
 
 use super::*;
-use crate::linear::{parse, solve::Solved};
+use crate::{
+    linear::{parse, solve::Solved},
+    read::solids::{self, HEX, TET, WEDGE},
+};
 
 /// A box in metres: nodes, and elements by Gmsh's type, physical tag and nodes.
 #[derive(Default)]
@@ -29,68 +31,43 @@ struct Type {
 
 const TRIANGLES: &[&[usize]] = &[&[0, 1, 2], &[0, 2, 3]];
 const TRIANGLE_EDGES: &[[usize; 2]] = &[[0, 1], [1, 2], [2, 0]];
-const HEX: &[&[usize]] = &[&[0, 1, 2, 3, 4, 5, 6, 7]];
 
-const HEX8: Type =
-    Type { solid: 5, parts: HEX, edges: &[], face: 3, faces: &[&[0, 1, 2, 3]], face_edges: &[] };
+const HEX8: Type = Type {
+    solid: 5,
+    parts: HEX.parts,
+    edges: &[],
+    face: 3,
+    faces: &[&[0, 1, 2, 3]],
+    face_edges: &[],
+};
 const HEX20: Type = Type {
     solid: 17,
-    parts: HEX,
-    edges: &[
-        [0, 1],
-        [0, 3],
-        [0, 4],
-        [1, 2],
-        [1, 5],
-        [2, 3],
-        [2, 6],
-        [3, 7],
-        [4, 5],
-        [4, 7],
-        [5, 6],
-        [6, 7],
-    ],
+    parts: HEX.parts,
+    edges: HEX.gmsh,
     face: 16,
     faces: &[&[0, 1, 2, 3]],
     face_edges: &[[0, 1], [1, 2], [2, 3], [3, 0]],
 };
-/// Kuhn's six tetrahedra about the diagonal from corner 0 to 6.
 const TET10: Type = Type {
     solid: 11,
-    parts: &[
-        &[0, 1, 2, 6],
-        &[0, 2, 3, 6],
-        &[0, 3, 7, 6],
-        &[0, 7, 4, 6],
-        &[0, 4, 5, 6],
-        &[0, 5, 1, 6],
-    ],
-    edges: &[[0, 1], [1, 2], [2, 0], [3, 0], [3, 2], [3, 1]],
+    parts: TET.parts,
+    edges: TET.gmsh,
     face: 9,
     faces: TRIANGLES,
     face_edges: TRIANGLE_EDGES,
 };
 const WEDGE15: Type = Type {
     solid: 18,
-    parts: &[&[0, 1, 2, 4, 5, 6], &[0, 2, 3, 4, 6, 7]],
-    edges: &[[0, 1], [0, 2], [0, 3], [1, 2], [1, 4], [2, 5], [3, 4], [3, 5], [4, 5]],
+    parts: WEDGE.parts,
+    edges: WEDGE.gmsh,
     face: 9,
     faces: TRIANGLES,
     face_edges: TRIANGLE_EDGES,
 };
 
 impl Body {
-    fn node(&mut self, at: DVec3) -> usize {
-        self.nodes.iter().position(|n| n.distance(at) < 1e-9).unwrap_or_else(|| {
-            self.nodes.push(at);
-            self.nodes.len() - 1
-        })
-    }
-
     fn element(&mut self, kind: u32, tag: u32, corners: &[DVec3], edges: &[[usize; 2]]) {
-        let middles = edges.iter().map(|&[a, b]| 0.5 * (corners[a] + corners[b]));
-        let places: Vec<DVec3> = corners.iter().copied().chain(middles).collect();
-        let nodes = places.into_iter().map(|p| self.node(p)).collect();
+        let nodes = solids::element(&mut self.nodes, corners, edges);
         self.elements.push((kind, tag, nodes));
     }
 
@@ -98,25 +75,17 @@ impl Body {
     /// `foot` (z = 0) and `head`, line `rim` (the edge of the head at y = 0), point `tip` (its end).
     fn new(kind: &Type, size: DVec3, parts: [u32; 3]) -> Self {
         let mut body = Self::default();
-        let step = size / DVec3::from_array(parts.map(f64::from));
-        for (i, j, k) in (0..parts[2])
-            .flat_map(|k| (0..parts[1]).flat_map(move |j| (0..parts[0]).map(move |i| (i, j, k))))
-        {
-            let at = |[a, b, c]: [u32; 3]| {
-                step * DVec3::new(f64::from(i + a), f64::from(j + b), f64::from(k + c))
-            };
-            let low = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]].map(at);
-            let high = [[0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]].map(at);
-            let all: Vec<DVec3> = low.into_iter().chain(high).collect();
+        for ([_, j, k], corners) in solids::bricks([DVec3::ZERO, size], parts) {
+            let (low, high) = corners.split_at(4);
             let of = |from: &[DVec3], part: &[usize]| -> Vec<DVec3> {
                 part.iter().map(|&c| from[c]).collect()
             };
             for part in kind.parts {
-                body.element(kind.solid, 1, &of(&all, part), kind.edges);
+                body.element(kind.solid, 1, &of(&corners, part), kind.edges);
             }
-            for (is_there, tag, corners) in [(k == 0, 2, low), (k + 1 == parts[2], 3, high)] {
+            for (is_there, tag, side) in [(k == 0, 2, low), (k + 1 == parts[2], 3, high)] {
                 for part in kind.faces.iter().filter(|_| is_there) {
-                    body.element(kind.face, tag, &of(&corners, part), kind.face_edges);
+                    body.element(kind.face, tag, &of(side, part), kind.face_edges);
                 }
             }
             if k + 1 == parts[2] && j == 0 {
@@ -327,6 +296,29 @@ fn all_groups_that_do_not_fit_are_named_at_once() {
         assert!(error.contains(part), "{part}: {error}");
     }
     assert_eq!(error.lines().count(), 1, "{error}");
+    // Values beside names, and all names where a material's is wrong; no more, since it is not known
+    // what is solid.
+    let wrong = BAR
+        .replace("modulus_gpa: 30", "modulus_gpa: 30e9")
+        .replace("\"core\"", "\"kern\"")
+        .replace("\"foot\"", "\"fuss\"")
+        + ", loads: [(group: \"tip\", action: Pressure(pressure_kpa: 1)), (group: \"head\", action: Pressure(pressure_kpa: inf)), (action: Force(force_kn: (0, 0, 1)))]";
+    let error = deck(&body, &wrong).unwrap_err();
+    for part in [
+        "a.groups.ron: materials[0].modulus_gpa is 30000000000.0",
+        "loads[1].pressure_kpa is inf",
+        "loads[2] needs a group",
+        "materials[0]: no physical group \"kern\"",
+        "element 1 and 1 more are in no volume",
+        "supports[0]: no physical group \"fuss\"",
+        "loads[0]: \"tip\" is a point, and needed is a surface",
+    ] {
+        assert!(error.contains(part), "{part}: {error}");
+    }
+    assert!(!error.contains("belong to no solid"), "{error}");
+    // Where only values are wrong, what rests on the solids is looked at, too.
+    let error = deck(&body, &said.replace("modulus_gpa: 30", "modulus_gpa: 0")).unwrap_err();
+    assert!(error.contains("modulus_gpa is 0.0") && error.contains("no density_kg_m3"), "{error}");
     // What is of two materials, and of none.
     let twice = BAR.replace("materials: [", "materials: [(modulus_gpa: 1, poisson: 0), ")
         + ", loads: [(action: Temperature(uniform_k: 1))]";

@@ -2,6 +2,8 @@
 
 use glam::DVec3;
 
+use crate::mesh::{HexFace, Mesh};
+
 /// Triangles in a tree of boxes, halved at the middle triangle along the longest side.
 pub(crate) struct Triangles {
     triangles: Vec<[DVec3; 3]>,
@@ -26,6 +28,15 @@ impl Triangles {
             tree.split(0, count);
         }
         tree
+    }
+
+    /// Faces of a mesh, each cut into two triangles.
+    pub(crate) fn of_faces(mesh: &Mesh, faces: impl IntoIterator<Item = HexFace>) -> Self {
+        let halves = |face| {
+            let [a, b, c, d] = mesh.face(face).map(|n| mesh.nodes[n as usize]);
+            [[a, b, c], [a, c, d]]
+        };
+        Self::new(faces.into_iter().flat_map(halves).collect())
     }
 
     fn split(&mut self, from: usize, to: usize) {

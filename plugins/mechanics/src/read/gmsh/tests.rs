@@ -3,6 +3,7 @@ use std::path::Path;
 use intrados_stage::random::Key;
 
 use super::*;
+use crate::read::solids::{HEX, TET, WEDGE};
 
 /// Two cubes along x, a bar through the first, named groups; 4.1.
 const TWO: &str = r#"$MeshFormat
@@ -164,52 +165,13 @@ fn version_two_is_read() {
 /// ordering"): every node lies between the ends of the edge that Abaqus gives it.
 #[test]
 fn middles_of_edges_are_renumbered() {
-    let gmsh_edges: [(i64, usize, &[[usize; 2]]); 3] = [
-        (11, 4, &[[0, 1], [1, 2], [2, 0], [3, 0], [3, 2], [3, 1]]),
-        (
-            17,
-            8,
-            &[
-                [0, 1],
-                [0, 3],
-                [0, 4],
-                [1, 2],
-                [1, 5],
-                [2, 3],
-                [2, 6],
-                [3, 7],
-                [4, 5],
-                [4, 7],
-                [5, 6],
-                [6, 7],
-            ],
-        ),
-        (18, 6, &[[0, 1], [0, 2], [0, 3], [1, 2], [1, 4], [2, 5], [3, 4], [3, 5], [4, 5]]),
-    ];
-    let abaqus_edges: [&[[usize; 2]]; 3] = [
-        &[[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]],
-        &[
-            [0, 1],
-            [1, 2],
-            [2, 3],
-            [3, 0],
-            [4, 5],
-            [5, 6],
-            [6, 7],
-            [7, 4],
-            [0, 4],
-            [1, 5],
-            [2, 6],
-            [3, 7],
-        ],
-        &[[0, 1], [1, 2], [2, 0], [3, 4], [4, 5], [5, 3], [0, 3], [1, 4], [2, 5]],
-    ];
-    for ((kind, corners, gmsh), abaqus) in gmsh_edges.into_iter().zip(abaqus_edges) {
+    for (kind, solid) in [(11, TET), (17, HEX), (18, WEDGE)] {
+        let corners = solid.parts[0].len();
         let order = Kind(kind).order().unwrap();
-        assert_eq!(order.len(), corners + abaqus.len());
+        assert_eq!(order.len(), corners + solid.abaqus.len());
         assert_eq!(Kind(kind).nodes(), Some(order.len()));
-        for (edge, &at) in abaqus.iter().zip(&order[corners..]) {
-            let [mut a, mut b] = [*edge, gmsh[at - corners]];
+        for (edge, &at) in solid.abaqus.iter().zip(&order[corners..]) {
+            let [mut a, mut b] = [*edge, solid.gmsh[at - corners]];
             a.sort_unstable();
             b.sort_unstable();
             assert_eq!(a, b, "{kind}");
