@@ -96,6 +96,10 @@ fn faults_are_named_with_their_place_and_remedy() {
         (reinforced("bars: [Around(count: 8, diameter_mm: 20, to: 1.2)]"), "members[0].body.reinforcement.bars[0].from", "both from 0 to 1"),
         (reinforced("bars: [Around(count: 8, diameter_mm: 20, from: NaN)]"), "members[0].body.reinforcement.bars[0].from", "both from 0 to 1"),
         (reinforced("bars: [Around(count: 8, diameter_mm: 20, laps: [(at: 0.05, length_mm: 600)])]"), "members[0].body.reinforcement.bars[0].laps[0].at", "move or shorten it"),
+        (reinforced("bars: [Around(count: 8, diameter_mm: 20), Around(count: 8, diameter_mm: 20, to: 0.009)]"), "members[0].body.reinforcement.bars[1].to", "let them end beyond 0.010"),
+        (reinforced("bars: [Around(count: 8, diameter_mm: 20, from: 0.995)]"), "members[0].body.reinforcement.bars[0].from", "let them begin before 0.990"),
+        (reinforced("bars: [Around(count: 8, diameter_mm: 20, laps: [(at: 0.007, length_mm: 12)])]"), "members[0].body.reinforcement.bars[0].laps[0].at", "nothing is left of the bars before it: let it end beyond 0.010"),
+        (reinforced("bars: [Around(count: 8, diameter_mm: 20, laps: [(at: 0.995, length_mm: 12)])]"), "members[0].body.reinforcement.bars[0].laps[0].at", "let it begin before 0.990"),
         (reinforced("bars: [Around(count: 8, diameter_mm: 20, to: 0.5, laps: [(at: 0.45, length_mm: 600)])]"), "members[0].body.reinforcement.bars[0].laps[0].at", "end before 0.500"),
         (
             reinforced("bars: [Around(count: 8, diameter_mm: 20, laps: [(at: 0.6, length_mm: 600), (at: 0.3, length_mm: 600)])]"),
