@@ -653,6 +653,7 @@ fn merge(scene: &mut Scene, model: gltf::Model, transform: Mat4) -> Vec<(String,
         .into_iter()
         .map(|(object, mut line)| {
             line.line.iter_mut().for_each(|p| *p = transform.transform_point3(*p));
+            line.inward = transform.transform_vector3(line.inward);
             (model.objects.get(object).and_then(|o| o.member), line)
         })
         .collect();
