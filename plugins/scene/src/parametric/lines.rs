@@ -52,10 +52,10 @@ pub(super) fn lines_within(
 /// From a member's own coordinates to the world.
 fn placed(mut lines: Vec<SteelLine>, frame: Frame) -> Vec<SteelLine> {
     let along = frame.axis.normalize_or_zero();
-    let turned = |p: Vec3| p.x * frame.zero + p.y * frame.ninety() + p.z * along;
+    let from = |o: Vec3, p: Vec3| o + p.x * frame.zero + p.y * frame.ninety() + p.z * along;
     for line in &mut lines {
-        line.line.iter_mut().for_each(|p| *p = frame.start + turned(*p));
-        line.inward = turned(line.inward);
+        line.line.iter_mut().for_each(|p| *p = from(frame.start, *p));
+        line.inward = from(Vec3::ZERO, line.inward);
     }
     lines
 }
