@@ -1,6 +1,6 @@
 //! Values of a scene's file in a form: what is written, what has been typed, and what that changes.
 
-use egui::{Grid, RichText, ScrollArea, TextEdit, Ui};
+use egui::{ComboBox, Grid, Response, RichText, ScrollArea, TextEdit, Ui};
 use intrados_scene::attach::{Field, FieldKind, Setting};
 use serde::{Deserialize, Serialize};
 
@@ -125,13 +125,18 @@ fn row(ui: &mut Ui, field: &Field, text: &mut String) {
     let note = term(&field.note);
     let label = if note.is_empty() { label } else { label.on_hover_text(&note) };
     ui.horizontal(|ui| {
-        let is_word = matches!(field.kind, FieldKind::Text | FieldKind::OneOf(_));
-        let width = if is_word { WIDTHS.1 } else { WIDTHS.0 };
+        let width = match field.kind {
+            FieldKind::Text | FieldKind::OneOf(_) | FieldKind::Choice(_) => WIDTHS.1,
+            FieldKind::Number | FieldKind::Whole | FieldKind::Day => WIDTHS.0,
+        };
         let choice = if matches!(field.kind, FieldKind::OneOf(_)) { 26.0 } else { 0.0 };
         let width = width.min(ui.available_width() - choice).max(40.0);
         let hint = if field.kind == FieldKind::Day { "2026-05-03" } else { note.as_str() };
-        let edit = TextEdit::singleline(text).desired_width(width).hint_text(hint);
-        let response = ui.add(edit).labelled_by(label.id);
+        let response = match &field.kind {
+            FieldKind::Choice(names) => pick(ui, field, names, width, text),
+            _ => ui.add(TextEdit::singleline(text).desired_width(width).hint_text(hint)),
+        };
+        let response = response.labelled_by(label.id);
         if !note.is_empty() {
             response.on_hover_text(&note);
         }
@@ -143,6 +148,18 @@ fn row(ui: &mut Ui, field: &Field, text: &mut String) {
         }
     });
     ui.end_row();
+}
+
+/// A list of what there is.
+fn pick(ui: &mut Ui, field: &Field, names: &[&str], width: f32, text: &mut String) -> Response {
+    let list = ComboBox::from_id_salt((&field.group, &field.name));
+    let list = list.width(width).selected_text(term(text));
+    let shown = list.show_ui(ui, |ui| {
+        for name in names {
+            ui.selectable_value(text, (*name).to_owned(), term(name));
+        }
+    });
+    shown.response
 }
 
 /// A list of what is usual.

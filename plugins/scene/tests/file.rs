@@ -7,6 +7,7 @@ use intrados_scene::{
     ErrorKind, LampKind, LoadError, MemberKind, Part, Scene, bundled,
     file::{self, MAX_BYTES},
     parametric,
+    structure::BarEnd,
 };
 use intrados_stage::Job;
 use proptest::prelude::*;
@@ -96,6 +97,10 @@ fn faults_are_named_with_their_place_and_remedy() {
         (reinforced("bars: [Around(count: 8, diameter_mm: 20, to: 1.2)]"), "members[0].body.reinforcement.bars[0].from", "both from 0 to 1"),
         (reinforced("bars: [Around(count: 8, diameter_mm: 20, from: NaN)]"), "members[0].body.reinforcement.bars[0].from", "both from 0 to 1"),
         (reinforced("bars: [Around(count: 8, diameter_mm: 20, laps: [(at: 0.05, length_mm: 600)])]"), "members[0].body.reinforcement.bars[0].laps[0].at", "move or shorten it"),
+        (reinforced("bars: [Around(count: 8, diameter_mm: 20), Around(count: 8, diameter_mm: 20, to: 0.009)]"), "members[0].body.reinforcement.bars[1].to", "let them end beyond 0.010"),
+        (reinforced("bars: [Around(count: 8, diameter_mm: 20, from: 0.995)]"), "members[0].body.reinforcement.bars[0].from", "let them begin before 0.990"),
+        (reinforced("bars: [Around(count: 8, diameter_mm: 20, laps: [(at: 0.007, length_mm: 12)])]"), "members[0].body.reinforcement.bars[0].laps[0].at", "nothing is left of the bars before it: let it end beyond 0.010"),
+        (reinforced("bars: [Around(count: 8, diameter_mm: 20, laps: [(at: 0.995, length_mm: 12)])]"), "members[0].body.reinforcement.bars[0].laps[0].at", "let it begin before 0.990"),
         (reinforced("bars: [Around(count: 8, diameter_mm: 20, to: 0.5, laps: [(at: 0.45, length_mm: 600)])]"), "members[0].body.reinforcement.bars[0].laps[0].at", "end before 0.500"),
         (
             reinforced("bars: [Around(count: 8, diameter_mm: 20, laps: [(at: 0.6, length_mm: 600), (at: 0.3, length_mm: 600)])]"),
@@ -543,6 +548,33 @@ fn column_c1_has_its_steel() {
         scene.objects.iter().filter(|o| o.member == Some(0) && o.part == Part::Bar).count(),
         12
     );
+}
+
+/// Bars of a turned column are drawn along their lines, with hooks where these are bent.
+#[test]
+fn hooked_bars_are_drawn_as_they_are_bent() {
+    let bars = "Around(count: 8, diameter_mm: 20, ends: (Straight, Hooked), laps: [(at: 0.5, length_mm: 1200)])";
+    let scene = load(&scene_of(&format!(
+        "members: [(id: \"C\", turn_deg: 30, at: (5, 1, 2), body: Column(section: Rectangle(width_m: 0.4, depth_m: 0.6), height_m: 6, reinforcement: (cover_mm: 40, bars: [{bars}])))],"
+    )))
+    .unwrap();
+    let drawn: Vec<_> = scene.objects.iter().filter(|o| o.part == Part::Bar).collect();
+    let steel = &scene.structure.assemblies[0].steel;
+    assert_eq!((drawn.len(), steel.len()), (16, 16));
+    for (object, line) in drawn.iter().zip(steel) {
+        let bent = line.bent();
+        let is_hooked = line.ends[1] == BarEnd::Hooked;
+        assert_eq!(bent.len(), if is_hooked { 7 } else { 2 }, "{line:?}");
+        let mesh = &scene.meshes[object.mesh];
+        let length: f32 = bent.windows(2).map(|w| w[0].distance(w[1])).sum();
+        let volume = std::f64::consts::PI * 0.01_f64.powi(2) * f64::from(length);
+        assert!((mesh.volume() / volume - 1.0).abs() < 0.02, "{} {volume}", mesh.volume());
+        for point in [bent[0], bent[bent.len() - 1]] {
+            let off = |p: &glam::Vec3| object.transform.transform_point3(*p).distance(point);
+            let nearest = mesh.positions.iter().map(off).fold(f32::INFINITY, f32::min);
+            assert!(nearest < 0.011, "{nearest} {line:?}");
+        }
+    }
 }
 
 /// A turned column's meter stands on its turned face.

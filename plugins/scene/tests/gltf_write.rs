@@ -190,6 +190,7 @@ fn lines_of_steel_and_frames_come_back() {
         grade: Grade::named("B500B").map(|g| g.at(Some(420.0))),
         bond: Bond::Slip,
         ends: [BarEnd::Straight, BarEnd::Hooked],
+        inward: Vec3::new(0.0, 0.0, 0.25),
         prestress: None,
     };
     let frame = Frame { start: Vec3::X, axis: Vec3::new(1.5, 2.0, 0.0), zero: Vec3::Z };

@@ -86,6 +86,29 @@ fn a_member_is_changed_in_its_sheet_and_changed_back() {
     assert_eq!(fs::read_to_string(&file).expect("the scene"), expected);
 }
 
+/// Where bars begin and where they are lapped is changed in metres along the member, and changed
+/// back.
+#[test]
+fn bars_are_lapped_in_the_sheet_and_whole_again() {
+    let (mut window, folder) = with_seen();
+    let file = folder.path().join("lonely.ron");
+    opened(&mut window);
+    for (field, text) in
+        [("begin at", "0,3"), ("middle of lap 1", "1.5"), ("length of lap 1", "900")]
+    {
+        type_into(&mut window, field, text);
+    }
+    window.click("Apply");
+    let bars = |w: &mut World| w.resource::<CurrentScene>().0.structure.assemblies[0].steel.len();
+    window.until("bars in two pieces", |w| bars(w) == 16);
+    let lapped = "diameter_mm: 20, from: 0.1, laps: [(at: 0.5, length_mm: 900)])";
+    let written = fs::read_to_string(&file).expect("the scene");
+    assert_eq!(written, LONELY.replace("diameter_mm: 20)", lapped));
+    window.harness.key_press_modifiers(egui::Modifiers::COMMAND, Key::Z);
+    window.until("whole bars", |w| bars(w) == 8);
+    assert_eq!(fs::read_to_string(&file).expect("the scene"), LONELY);
+}
+
 /// What the file would be refused for is refused with its line; nothing is written, and what was
 /// typed stays, to be mended.
 #[test]

@@ -24,7 +24,7 @@ const LEAST: f64 = -2.0;
 /// Blurs that are tried, pixels (deviation of a Gaussian): the first, by how much each is more than
 /// the one before, and how many. Then the one of most sharp pictures.
 const BLURS: (f64, f64, i32) = (0.2, 1.09, 31);
-pub(super) const SHARP: f64 = 0.6;
+const SHARP: f64 = 0.6;
 /// A pixel and the reading between pixels spread light, too, with a variance of 1/12 + 1/6: as these
 /// three points do, a share of .25, .5 and .25 at so many pixels before, on and after.
 const SPREAD: f64 = std::f64::consts::FRAC_1_SQRT_2;

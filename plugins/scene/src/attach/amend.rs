@@ -22,6 +22,16 @@ pub struct Setting {
     pub(super) value: Option<String>,
 }
 
+impl Setting {
+    /// The number of an entry that it takes out of a list, where those behind it move up.
+    fn entry_gone(&self) -> Option<usize> {
+        match self.path.last() {
+            Some(Step::Entry(number)) if self.value.is_none() => Some(*number),
+            _ => None,
+        }
+    }
+}
+
 impl Project {
     /// Writes values into the scene's file, where everything else stays as it is: comments, order,
     /// other numbers. `shown` is the scene that they were read from.
@@ -45,14 +55,7 @@ impl Project {
             let why = "has been changed since it was opened: reload the scene first";
             return Err(AttachError::CannotWrite(format!("{place}: {why}")));
         }
-        let edited = settings.iter().try_fold(text.clone(), |text, setting| {
-            match (tree::set(&text, &setting.path, setting.value.as_deref()), &setting.value) {
-                (Some(text), _) => Some(text),
-                // What is not there need not be taken out.
-                (None, None) => Some(text),
-                (None, Some(_)) => None,
-            }
-        });
+        let edited = written(&text, settings);
         let cannot = || {
             let why = "is written in a way that cannot be edited by a form: change it by hand";
             AttachError::BadInput(format!("{place}: {why}"))
@@ -72,10 +75,34 @@ impl Project {
     }
 }
 
+/// A text with other values: each is written once, though several need the same before them, and
+/// entries are taken out last, from the back, so that numbers stay true. None: it has no such place.
+pub(super) fn written(text: &str, settings: &[Setting]) -> Option<String> {
+    let mut once: Vec<&Setting> = Vec::new();
+    for setting in settings {
+        if !once.contains(&setting) {
+            once.push(setting);
+        }
+    }
+    once.sort_by_key(|s| s.entry_gone().map(std::cmp::Reverse));
+    once.into_iter().try_fold(text.to_owned(), |text, setting| {
+        match (tree::set(&text, &setting.path, setting.value.as_deref()), &setting.value) {
+            (Some(text), _) => Some(text),
+            // What is not there need not be taken out.
+            (None, None) => Some(text),
+            (None, Some(_)) => None,
+        }
+    })
+}
+
 /// Whether two files differ in these places alone.
 fn only_there(before: &SceneFile, after: &SceneFile, settings: &[Setting]) -> bool {
     let [Ok(before), Ok(after)] = [before, after].map(serde_json::to_value) else { return false };
-    let places: Vec<String> = settings.iter().map(|s| pointer(&s.path)).collect();
+    let place = |s: &Setting| {
+        let gone = usize::from(s.entry_gone().is_some());
+        pointer(&s.path[..s.path.len() - gone])
+    };
+    let places: Vec<String> = settings.iter().map(place).collect();
     let mut differing = Vec::new();
     differences(&before, &after, &mut String::new(), &mut differing);
     differing.iter().all(|at| places.iter().any(|p| is_within(at, p) || is_within(p, at)))
@@ -240,6 +267,61 @@ mod tests {
         assert_eq!(load(&path).structure.concretes[0].fcm_mpa, Some(29.0));
         amend(&path, &load(&path), Some("C1"), &[("Concrete", "mean strength f_cm", "")]).unwrap();
         assert_eq!(load(&path).structure.concretes[0].fcm_mpa, None);
+    }
+
+    #[test]
+    fn ends_and_laps_of_bars_are_written_as_places_along_the_member() {
+        let (_folder, path) = written();
+        let bars = [
+            ("Bars", "cover", "35"),
+            ("Bars", "bars around the section", "8"),
+            ("Bars", "their diameter", "16"),
+        ];
+        amend(&path, &load(&path), Some("C1"), &bars).unwrap();
+        let said = |path: &std::path::Path| {
+            let text = fs::read_to_string(path).unwrap();
+            let (_, bars) = text.split_once("Around(").unwrap();
+            bars.split_once(")]),\n").unwrap().0.to_owned()
+        };
+        let values = [
+            ("Bars around", "begin at", "0.3"),
+            ("Bars around", "first end", "Straight"),
+            ("Bars around", "last end", "Hooked"),
+            ("Bars around", "middle of lap 1", "1.5"),
+            ("Bars around", "length of lap 1", "900"),
+        ];
+        amend(&path, &load(&path), Some("C1"), &values).unwrap();
+        let once = "count: 8, diameter_mm: 16, from: 0.1, ends: (Straight, Hooked), laps: [";
+        assert_eq!(said(&path), format!("{once}(at: 0.5, length_mm: 900)]"));
+        let second =
+            [("Bars around", "middle of lap 2", "2,55"), ("Bars around", "length of lap 2", "600")];
+        amend(&path, &load(&path), Some("C1"), &second).unwrap();
+        let both = format!("{once}(at: 0.5, length_mm: 900), (at: 0.85, length_mm: 600)]");
+        assert_eq!(said(&path), both);
+        // What the form then shows is what was written.
+        let scene = load(&path);
+        let all = fields(&scene, scene.members.first());
+        for (group, name, value) in values {
+            let field = all.iter().find(|f| f.group == group && f.name == name).unwrap();
+            assert_eq!(field.value, value, "{name}");
+        }
+        let end = all.iter().find(|f| f.name == "first end").unwrap();
+        let why = end.set("Bent").unwrap_err();
+        assert_eq!(why, "first end: “Bent” is none of Anchored, Hooked, Straight");
+        let gone = [
+            ("Bars around", "middle of lap 1", ""),
+            ("Bars around", "length of lap 1", ""),
+            ("Bars around", "last end", "Anchored"),
+        ];
+        let mut change = amend(&path, &load(&path), Some("C1"), &gone).unwrap();
+        let left = once.replace("Hooked", "Anchored") + "(at: 0.85, length_mm: 600)]";
+        assert_eq!(said(&path), left);
+        change.turn(&Job::default()).unwrap();
+        assert_eq!(said(&path), both);
+        // All laps at once, those behind first.
+        let gone = [("Bars around", "length of lap 1", ""), ("Bars around", "length of lap 2", "")];
+        amend(&path, &load(&path), Some("C1"), &gone).unwrap();
+        assert_eq!(said(&path), format!("{once}]"));
     }
 
     #[test]

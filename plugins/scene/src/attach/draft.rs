@@ -4,7 +4,7 @@ use std::{fs, io, path::Path, path::PathBuf, sync::Arc};
 
 use intrados_stage::{Access, Job};
 
-use super::{AttachError, Field, Setting, fields, open_up, tree, write};
+use super::{AttachError, Field, Setting, amend, fields, open_up, write};
 use crate::{
     LoadError, Scene,
     file::evidence,
@@ -31,10 +31,8 @@ impl Draft {
     pub fn new(kind: &str, settings: &[Setting], job: &Job) -> Result<Self, LoadError> {
         let bad = |why: &str| LoadError::bad(PROJECT, "NO_TEMPLATE", why);
         let text = template(kind).ok_or_else(|| bad("there is no template of this kind"))?;
-        let text = settings.iter().try_fold(text.to_owned(), |text, setting| {
-            tree::set(&text, &setting.path, setting.value.as_deref())
-        });
-        let text = text.ok_or_else(|| bad("has no such place: change it by hand"))?;
+        let text = amend::written(text, settings)
+            .ok_or_else(|| bad("has no such place: change it by hand"))?;
         let mut sources = Sources::new(Path::new(""), &Access::default());
         let mut scene = from_text(PROJECT, &text, &mut sources, job)?;
         scene.name = kind.to_owned();

@@ -9,7 +9,9 @@ use super::{
 use crate::{
     Member, Scene,
     file::{self, Assumed, CLASSES, Detail, SceneFile},
-    structure::{Action, Bars, Body, Date, Exposure, Grade, Load, Reinforcement, Section},
+    structure::{
+        Action, BarEnd, Bars, Body, Date, Exposure, Grade, Lap, Load, Reinforcement, Section,
+    },
 };
 
 /// A value of the file that a form changes.
@@ -30,6 +32,10 @@ pub struct Field {
     path: Vec<Step>,
     /// What has to be written before.
     before: Vec<Setting>,
+    /// What a number is divided by before it is written: a length along an axis is a share there.
+    per: f32,
+    /// Whether the whole entry that it is of is taken out where it is left empty.
+    of_entry: bool,
 }
 
 /// What may be written in a field.
@@ -45,6 +51,8 @@ pub enum FieldKind {
     Day,
     /// One of these, or other words.
     OneOf(Vec<String>),
+    /// One of these names and nothing else.
+    Choice(&'static [&'static str]),
 }
 
 impl Field {
@@ -59,7 +67,11 @@ impl Field {
             return Err(format!("{}: fill it in, 0 for none", self.name));
         }
         let mut settings = if value.is_some() { self.before.clone() } else { Vec::new() };
-        settings.push(Setting { path: self.path.clone(), value });
+        let mut path = self.path.clone();
+        if value.is_none() && self.of_entry {
+            path.pop();
+        }
+        settings.push(Setting { path, value });
         Ok(settings)
     }
 
@@ -73,7 +85,9 @@ impl Field {
         match self.kind {
             FieldKind::Number => {
                 let point = text.replace(',', ".");
-                let number: Option<f32> = point.parse().ok().filter(|n: &f32| n.is_finite());
+                let number: Option<f64> = point.parse().ok();
+                let number = number.map(|n| (n / f64::from(self.per)) as f32);
+                let number = number.filter(|n| n.is_finite());
                 let number = number.ok_or_else(|| format!("{name}: “{text}” is no number"))?;
                 Ok(number.to_string())
             }
@@ -87,6 +101,10 @@ impl Field {
                 Ok(format!("\"{day}\""))
             }
             FieldKind::Text | FieldKind::OneOf(_) => quoted(text),
+            FieldKind::Choice(names) if names.contains(&text) => Ok(text.to_owned()),
+            FieldKind::Choice(names) => {
+                Err(format!("{name}: “{text}” is none of {}", names.join(", ")))
+            }
         }
     }
 }
@@ -155,7 +173,18 @@ impl List<'_> {
     ) {
         let group = self.group.clone();
         let (name, note) = (name.to_owned(), String::new());
-        self.fields.push(Field { group, name, unit, kind, value, note, path: at, before: vec![] });
+        self.fields.push(Field {
+            group,
+            name,
+            unit,
+            kind,
+            value,
+            note,
+            path: at,
+            before: vec![],
+            per: 1.0,
+            of_entry: false,
+        });
     }
 
     fn number(&mut self, name: &str, unit: &'static str, value: Option<f32>, at: Vec<Step>) {
@@ -171,6 +200,15 @@ impl List<'_> {
     fn note(&mut self, note: impl Into<String>) {
         if let Some(field) = self.fields.last_mut() {
             field.note = note.into();
+        }
+    }
+
+    /// A place on an axis of this length, m, which the file has as a share of it.
+    fn place(&mut self, name: &str, share: Option<f32>, length_m: f32, at: Vec<Step>) {
+        let millimetres = |share: f32| (1000.0 * share * length_m).round() / 1000.0;
+        self.number(name, "m", share.map(millimetres), at);
+        if let Some(field) = self.fields.last_mut() {
+            field.per = length_m;
         }
     }
 
@@ -260,9 +298,10 @@ impl List<'_> {
         if let Some(bars) = detail.and_then(|d| d.reinforcement.as_ref()) {
             let from = self.fields.len();
             let path = [list.clone(), Entry(index), Named("reinforcement")];
-            self.reinforcement(Some(bars), &path);
+            self.reinforcement(Some(bars), member.frame.axis.length(), &path);
             let states = before(index, &[Assumed::Reinforcement]);
-            self.fields.iter_mut().skip(from).for_each(|f| f.before.clone_from(&states));
+            let own = self.fields.iter_mut().skip(from);
+            own.for_each(|f| f.before = [&states[..], &f.before[..]].concat());
         }
         let index = own(|d| d.body.is_some());
         if let Some(body) = file.details.get(index).and_then(|d| d.body.as_ref()) {
@@ -328,12 +367,14 @@ impl List<'_> {
             Body::Column { section, height_m, reinforcement } => {
                 self.section(path, section);
                 self.number("height", "m", Some(*height_m), place(&[Named("height_m")]));
-                self.reinforcement(reinforcement.as_ref(), &place(&[Named("reinforcement")]));
+                let at = place(&[Named("reinforcement")]);
+                self.reinforcement(reinforcement.as_ref(), *height_m, &at);
             }
             Body::Beam { section, length_m, reinforcement, .. } => {
                 self.section(path, section);
                 self.number("length", "m", Some(*length_m), place(&[Named("length_m")]));
-                self.reinforcement(reinforcement.as_ref(), &place(&[Named("reinforcement")]));
+                let at = place(&[Named("reinforcement")]);
+                self.reinforcement(reinforcement.as_ref(), *length_m, &at);
             }
             Body::BoxGirder { section: s, length_m, reinforcement, .. } => {
                 for (name, value, field) in [
@@ -348,7 +389,8 @@ impl List<'_> {
                     self.number(name, "m", Some(value), at);
                 }
                 self.number("length", "m", Some(*length_m), place(&[Named("length_m")]));
-                self.reinforcement(reinforcement.as_ref(), &place(&[Named("reinforcement")]));
+                let at = place(&[Named("reinforcement")]);
+                self.reinforcement(reinforcement.as_ref(), *length_m, &at);
             }
             Body::Tunnel { radius_m, length_m, segments, inner_lining, ground, .. } => {
                 self.group("Size of the tunnel");
@@ -390,7 +432,8 @@ impl List<'_> {
         }
     }
 
-    fn reinforcement(&mut self, said: Option<&Reinforcement>, path: &[Step]) {
+    /// `length_m`: of the member's axis.
+    fn reinforcement(&mut self, said: Option<&Reinforcement>, length_m: f32, path: &[Step]) {
         self.group("Bars");
         let place = |steps: &[Step]| at(path, steps);
         self.number("cover", "mm", said.map(|r| r.cover_mm), place(&[Named("cover_mm")]));
@@ -407,28 +450,67 @@ impl List<'_> {
         };
         self.number("yield stress", "MPa", said.f_y_mpa, place(&[Named("f_y_mpa")]));
         self.note("left out: the grade's");
-        for (number, bars) in said.bars.iter().enumerate() {
-            self.bars(bars, &place(&[Named("bars"), Entry(number)]), number, said.bars.len());
-        }
         let stirrups = said.stirrups.as_ref();
-        let place = |field| at(path, &[Named("stirrups"), Named(field)]);
+        let of_stirrups = |field| place(&[Named("stirrups"), Named(field)]);
         let diameter = stirrups.map(|s| s.diameter_mm);
-        self.number("diameter of stirrups", "mm", diameter, place("diameter_mm"));
+        self.number("diameter of stirrups", "mm", diameter, of_stirrups("diameter_mm"));
         let spacing = stirrups.map(|s| s.spacing_mm);
-        self.number("stirrups every", "mm", spacing, place("spacing_mm"));
+        self.number("stirrups every", "mm", spacing, of_stirrups("spacing_mm"));
+        for (number, bars) in said.bars.iter().enumerate() {
+            let what = match bars {
+                Bars::Around { .. } => "Bars around".to_owned(),
+                Bars::Row { side_deg, .. } => format!("Bars at {side_deg}°"),
+            };
+            let is_one = said.bars.len() == 1;
+            let layer = if is_one { String::new() } else { format!(", layer {}", number + 1) };
+            self.group(what + &layer);
+            self.bars(bars, length_m, &place(&[Named("bars"), Entry(number)]));
+        }
     }
 
-    fn bars(&mut self, bars: &Bars, path: &[Step], number: usize, of: usize) {
+    /// A set of bars, from place to place along its member.
+    fn bars(&mut self, bars: &Bars, length_m: f32, path: &[Step]) {
+        const ENDS: &[&str] = &["Anchored", "Hooked", "Straight"];
         let place = |field| at(path, &[Named(field)]);
         let (count, diameter) = bars.size();
-        let what = match bars {
-            Bars::Around { .. } => "around".to_owned(),
-            Bars::Row { side_deg, .. } => format!("at {side_deg}°"),
-        };
-        let layer = if of > 1 { format!(", layer {}", number + 1) } else { String::new() };
-        self.count(&format!("bars {what}{layer}"), Some(count), place("count"));
-        let name = format!("diameter of bars {what}{layer}");
-        self.number(&name, "mm", Some(diameter), place("diameter_mm"));
+        self.count("number of bars", Some(count), place("count"));
+        self.number("diameter of a bar", "mm", Some(diameter), place("diameter_mm"));
+        let [from, to] = bars.span();
+        self.place("begin at", Some(from), length_m, place("from"));
+        self.note("along the axis; left out: at its start");
+        self.place("end at", Some(to), length_m, place("to"));
+        self.note("along the axis; left out: at its end");
+        let ends = bars.ends();
+        // Both stand in one pair of brackets.
+        let unsaid = ends == [BarEnd::default(); 2];
+        let both = Some(format!("({:?}, {:?})", ends[0], ends[1]));
+        let before = Setting { path: place("ends"), value: both };
+        for (k, name) in ["first end", "last end"].into_iter().enumerate() {
+            let at = at(path, &[Named("ends"), Entry(k)]);
+            self.add(name, "", FieldKind::Choice(ENDS), format!("{:?}", ends[k]), at);
+            self.note("counts where bars slip");
+            self.before(if unsaid { vec![before.clone()] } else { Vec::new() });
+        }
+        self.laps(bars.laps(), length_m, path);
+    }
+
+    /// Laps, and room for one more.
+    fn laps(&mut self, laps: &[Lap], length_m: f32, path: &[Step]) {
+        for (k, lap) in laps.iter().map(Some).chain([None]).enumerate() {
+            let place = |field| at(path, &[Named("laps"), Entry(k), Named(field)]);
+            let note = match lap {
+                Some(_) => "along the axis; left out: no lap",
+                None => "one more: place and length go together",
+            };
+            let from = self.fields.len();
+            let name = format!("middle of lap {}", k + 1);
+            self.place(&name, lap.map(|lap| lap.at), length_m, place("at"));
+            let name = format!("length of lap {}", k + 1);
+            self.number(&name, "mm", lap.map(|lap| lap.length_mm), place("length_mm"));
+            for field in self.fields.iter_mut().skip(from) {
+                (field.note, field.of_entry) = (note.to_owned(), true);
+            }
+        }
     }
 
     fn loads(&mut self, id: &str, assembly: Option<&str>) {

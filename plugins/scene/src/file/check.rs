@@ -4,7 +4,7 @@ use std::collections::HashSet;
 
 use glam::Vec3;
 
-use super::*;
+use super::{buried::buried, *};
 use crate::{Damage, Drilled, Lens, problem::Problem};
 
 /// Lengths beyond this are refused, m: single precision has no millimetres left.
@@ -798,6 +798,7 @@ impl Checker<'_> {
     ) {
         let Some(r) = r else { return };
         self.at("reinforcement", |c| {
+            let before = c.problems.len();
             c.cover(r.cover_mm);
             c.grade(&r.steel, r.f_y_mpa);
             let mut thickest = 0.0_f32;
@@ -826,6 +827,11 @@ impl Checker<'_> {
                 c.within("diameter_mm", diameter, 1.0, 100.0);
                 thickest = thickest.max(diameter);
             });
+            if c.problems.len() == before {
+                for [at, why] in length_m.map_or(Vec::new(), |length| buried(r, length)) {
+                    c.error(&at, "BURIED", why);
+                }
+            }
             let mut stirrup = 0.0;
             if let Some(s) = &r.stirrups {
                 c.at("stirrups", |c| c.stirrups(s, length_m.unwrap_or(1.0)));

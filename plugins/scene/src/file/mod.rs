@@ -13,6 +13,7 @@
 //! | beam, box girder | +x | +y, top (180 is the soffit) | +z, front |
 //! | tunnel | +z | +x | +y, crown |
 
+mod buried;
 mod check;
 mod doubt;
 pub mod evidence;

@@ -10,7 +10,9 @@ use glam::{Mat4, Quat, Vec2, Vec3};
 use intrados_stage::{Access, Job, random::Key};
 
 use super::{
-    Assumed, Lamp, Material, Meter, SceneFile, Shape, Strength, Surface, doubts,
+    Assumed, Lamp, Material, Meter, SceneFile, Shape, Strength, Surface,
+    buried::buried,
+    doubts,
     evidence::{Evidence, place},
     unknown_members,
 };
@@ -449,6 +451,11 @@ impl Builder<'_> {
                         format!("that makes more than {MAX_STIRRUPS} of them: space them wider");
                     return Err(LoadError::bad(place, "TOO_MANY", message));
                 }
+                let left = buried(reinforcement, assembly.frame.axis.length());
+                if let Some([at, why]) = left.into_iter().next() {
+                    let place = format!("{name}: details[{i}].reinforcement.{at}");
+                    return Err(LoadError::bad(place, "BURIED", why));
+                }
                 let surface = surface(index, objects, meshes);
                 let lines = parametric::lines_in(assembly.frame, &surface, reinforcement);
                 assembly.steel.extend(lines);
@@ -646,6 +653,7 @@ fn merge(scene: &mut Scene, model: gltf::Model, transform: Mat4) -> Vec<(String,
         .into_iter()
         .map(|(object, mut line)| {
             line.line.iter_mut().for_each(|p| *p = transform.transform_point3(*p));
+            line.inward = transform.transform_vector3(line.inward);
             (model.objects.get(object).and_then(|o| o.member), line)
         })
         .collect();

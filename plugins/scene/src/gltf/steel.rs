@@ -25,7 +25,12 @@ pub(super) fn said(line: &SteelLine) -> Value {
     }
     if line.bond == Bond::Slip {
         said.insert("bond".into(), json!(line.bond));
+    }
+    if line.bond == Bond::Slip || line.inward != Vec3::ZERO {
         said.insert("ends".into(), json!(line.ends));
+    }
+    if line.inward != Vec3::ZERO {
+        said.insert("inward_m".into(), json!(line.inward.to_array()));
     }
     if let Some(prestress) = &line.prestress {
         said.insert("prestress".into(), serde_json::to_value(prestress).unwrap_or_default());
@@ -36,10 +41,6 @@ pub(super) fn said(line: &SteelLine) -> Value {
 /// The same, read; none where it is damaged.
 pub(super) fn read(said: &Value, part: Part) -> Option<SteelLine> {
     let points = said.list("line");
-    let point = |p: &Value| {
-        let [x, y, z]: [f32; 3] = serde_json::from_value(p.clone()).ok()?;
-        Some(Vec3::new(x, y, z)).filter(|p| p.is_finite())
-    };
     let line: Vec<Vec3> = points.iter().take(MOST_POINTS).map(point).collect::<Option<_>>()?;
     let diameter = said.number("diameter_m")? as f32;
     let fits = (2..=MOST_POINTS).contains(&points.len()) && (1e-4..=2.0).contains(&diameter);
@@ -54,8 +55,14 @@ pub(super) fn read(said: &Value, part: Part) -> Option<SteelLine> {
         grade,
         bond: serde_json::from_value(said.field("bond").clone()).unwrap_or_default(),
         ends: serde_json::from_value(said.field("ends").clone()).unwrap_or_default(),
+        inward: point(said.field("inward_m")).unwrap_or_default(),
         prestress,
     })
+}
+
+fn point(said: &Value) -> Option<Vec3> {
+    let point: [f32; 3] = serde_json::from_value(said.clone()).ok()?;
+    Some(Vec3::from(point)).filter(|p| p.is_finite())
 }
 
 /// `frame` of a node.

@@ -86,6 +86,7 @@ fn scale(model: &mut Model, metres: f64) {
     for (_, line) in &mut model.steel {
         line.diameter *= metres as f32;
         line.line.iter_mut().for_each(|p| *p *= metres as f32);
+        line.inward *= metres as f32;
     }
     model.cameras.clear();
     model.lamps.clear();

@@ -29,12 +29,7 @@ pub(crate) fn lines_of(body: &Body, frame: Frame) -> Vec<SteelLine> {
             prism(outline(section), *length_m, reinforcement.as_ref(), tendons)
         }
         Body::BoxGirder { section, length_m, reinforcement, tendons } => {
-            let outline = Outline::Girder {
-                top: 0.5 * section.top_width_m,
-                bottom: 0.5 * section.bottom_width_m,
-                depth: 0.5 * section.depth_m,
-            };
-            prism(outline, *length_m, reinforcement.as_ref(), tendons)
+            prism(Outline::girder(section), *length_m, reinforcement.as_ref(), tendons)
         }
         Body::Tunnel { .. } => lining(body),
     };
@@ -57,8 +52,11 @@ pub(super) fn lines_within(
 /// From a member's own coordinates to the world.
 fn placed(mut lines: Vec<SteelLine>, frame: Frame) -> Vec<SteelLine> {
     let along = frame.axis.normalize_or_zero();
-    let world = |p: Vec3| frame.start + p.x * frame.zero + p.y * frame.ninety() + p.z * along;
-    lines.iter_mut().flat_map(|l| &mut l.line).for_each(|p| *p = world(*p));
+    let from = |o: Vec3, p: Vec3| o + p.x * frame.zero + p.y * frame.ninety() + p.z * along;
+    for line in &mut lines {
+        line.line.iter_mut().for_each(|p| *p = from(frame.start, *p));
+        line.inward = from(Vec3::ZERO, line.inward);
+    }
     lines
 }
 
@@ -88,6 +86,7 @@ fn prism(
                 grade: of(bar.f_y_mpa),
                 bond: bar.bond,
                 ends: bar.ends,
+                inward: bar.inward.extend(0.0),
                 ..SteelLine::new(format!("bar {}", i + 1), Part::Bar, bar.diameter, line)
             }
         }));

@@ -127,11 +127,7 @@ pub(crate) fn add(
             tendons,
         ),
         Body::BoxGirder { section, length_m, reinforcement, tendons } => {
-            let outline = Outline::Girder {
-                top: 0.5 * section.top_width_m,
-                bottom: 0.5 * section.bottom_width_m,
-                depth: 0.5 * section.depth_m,
-            };
+            let outline = Outline::girder(section);
             let (mesh, area) = girder(section, *length_m);
             builder.prism(
                 MemberKind::Beam,
@@ -297,19 +293,20 @@ impl Builder<'_> {
         if let Some(r) = reinforcement {
             self.job.step(0, 1)?;
             let cover = (r.cover_mm / 1000.0).min(0.4 * length);
-            let mut last: Option<(f32, [f32; 2], usize)> = None;
+            let mut last: Option<(f32, Vec<Vec3>, usize)> = None;
             for (i, bar) in steel::bars(outline, r, length).into_iter().enumerate() {
-                let (diameter, ends) = (bar.diameter, bar.reach(length, cover));
-                // Bars of one diameter and length share a mesh.
-                let mesh = match last {
-                    Some((d, e, mesh)) if d == diameter && e == ends => mesh,
-                    _ => self.mesh(solid::tube(&ends.map(|z| Vec3::Z * z), diameter, false)),
+                let (diameter, shape) = (bar.diameter, bar.shape(length, cover));
+                // Bars of one diameter and shape share a mesh.
+                let mesh = match &last {
+                    Some((d, s, mesh)) if *d == diameter && *s == shape => *mesh,
+                    _ => self.mesh(solid::tube(&shape, diameter, false)),
                 };
-                last = Some((diameter, ends, mesh));
+                last = Some((diameter, shape, mesh));
+                let turn = Quat::from_rotation_z(bar.inward.to_angle());
                 self.place(
                     format!("{id} bar {}", i + 1),
                     mesh,
-                    Mat4::from_translation(bar.at.extend(0.0)),
+                    Mat4::from_rotation_translation(turn, bar.at.extend(0.0)),
                     member,
                     Part::Bar,
                 );

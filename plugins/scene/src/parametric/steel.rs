@@ -1,11 +1,11 @@
 //! Where bars, stirrups and tendons lie. Sections in the member's own frame: x towards angle 0, y
 //! towards angle 90, z along the axis, metres.
 
-use std::f32::consts::{FRAC_PI_2, PI, TAU};
+use std::f32::consts::{FRAC_1_SQRT_2, FRAC_PI_2, PI, TAU};
 
 use glam::{Vec2, Vec3};
 
-use crate::structure::{BarEnd, Bars, Bond, Reinforcement, Stirrups};
+use crate::structure::{BarEnd, Bars, Bond, BoxSection, Reinforcement, Stirrups, bent};
 
 /// The outline that steel keeps its cover from.
 #[derive(Debug, Clone, Copy)]
@@ -14,8 +14,20 @@ pub(crate) enum Outline {
     Rectangle(Vec2),
     /// Radius.
     Round(f32),
-    /// A box girder: half its top width, half its bottom width, half its depth (x is up).
-    Girder { top: f32, bottom: f32, depth: f32 },
+    /// A box girder: half its top width, half its bottom width, half its depth (x is up), and the
+    /// thinnest of its walls.
+    Girder { top: f32, bottom: f32, depth: f32, wall: f32 },
+}
+
+impl Outline {
+    pub(crate) fn girder(section: &BoxSection) -> Self {
+        Self::Girder {
+            top: 0.5 * section.top_width_m,
+            bottom: 0.5 * section.bottom_width_m,
+            depth: 0.5 * section.depth_m,
+            wall: section.top_m.min(section.bottom_m).min(section.web_m),
+        }
+    }
 }
 
 /// A longitudinal bar.
@@ -31,6 +43,8 @@ pub(crate) struct Laid {
     pub(crate) bond: Bond,
     /// How its ends hold.
     pub(crate) ends: [BarEnd; 2],
+    /// Towards where hooked ends are bent, as long as there is room, m; zero: none is hooked.
+    pub(crate) inward: Vec2,
     /// Yield stress where it is another than that of the rest, MPa.
     pub(crate) f_y_mpa: Option<f32>,
 }
@@ -39,6 +53,12 @@ impl Laid {
     /// Where it begins and ends along an axis of `length`, `cover` away from both faces, m.
     pub(crate) fn reach(&self, length: f32, cover: f32) -> [f32; 2] {
         self.span.map(|share| (share * length).clamp(cover, length - cover))
+    }
+
+    /// Its line about its own place, as [`Laid::reach`] says, with its hooks towards x.
+    pub(crate) fn shape(&self, length: f32, cover: f32) -> Vec<Vec3> {
+        let line = self.reach(length, cover).map(|z| Vec3::Z * z);
+        bent(&line, self.ends, self.inward.length() * Vec3::X, self.diameter)
     }
 }
 
@@ -71,7 +91,7 @@ pub(crate) fn bars(outline: Outline, r: &Reinforcement, length: f32) -> Vec<Laid
             (Bars::Row { side_deg, .. }, Outline::Rectangle(half)) => {
                 row(inner(half, *side_deg), half.y - first, *side_deg, count)
             }
-            (Bars::Row { side_deg, .. }, Outline::Girder { top, bottom, depth }) => {
+            (Bars::Row { side_deg, .. }, Outline::Girder { top, bottom, depth, .. }) => {
                 let width = if *side_deg == 0.0 { top } else { bottom };
                 row(inner(Vec2::new(depth, bottom), *side_deg), width - first, *side_deg, count)
             }
@@ -80,7 +100,11 @@ pub(crate) fn bars(outline: Outline, r: &Reinforcement, length: f32) -> Vec<Laid
         let bond = if bars.laps().is_empty() { r.bond } else { Bond::Slip };
         for (i, (span, ends)) in pieces(bars, length).into_iter().enumerate() {
             let place = |at: &Vec2| if i % 2 == 1 { beside(outline, *at, diameter) } else { *at };
-            let laid = |at| Laid { at, diameter, span, bond, ends, f_y_mpa };
+            let is_hooked = ends.contains(&BarEnd::Hooked);
+            let laid = |at| {
+                let inward = if is_hooked { inward(outline, bars, at, first) } else { Vec2::ZERO };
+                Laid { at, diameter, span, bond, ends, inward, f_y_mpa }
+            };
             list.extend(places.iter().map(place).map(laid));
         }
     }
@@ -118,6 +142,37 @@ fn beside(outline: Outline, at: Vec2, diameter: f32) -> Vec2 {
     } else {
         Vec2::new(towards_middle(at.x), at.y)
     }
+}
+
+/// Towards where a bar at a place is bent: off the face that it lies at, in a corner off both, as far
+/// as the first layer (so far in) before the face across.
+fn inward(outline: Outline, bars: &Bars, at: Vec2, first: f32) -> Vec2 {
+    let (half, most) = match outline {
+        Outline::Round(radius) => {
+            return -at.normalize_or_zero() * (radius - first + at.length());
+        }
+        Outline::Rectangle(half) => (half - first, f32::INFINITY),
+        Outline::Girder { bottom, depth, wall, .. } => {
+            (Vec2::new(depth, bottom) - first, (wall - 2.0 * first).max(0.0))
+        }
+    };
+    let (off, back) = (half - at.abs(), -at.signum());
+    let towards = match *bars {
+        Bars::Row { side_deg, .. } => match side_deg as i32 {
+            0 => Vec2::NEG_X,
+            180 => Vec2::X,
+            90 => Vec2::NEG_Y,
+            _ => Vec2::Y,
+        },
+        Bars::Around { .. } if (off.x - off.y).abs() < 1e-3 => FRAC_1_SQRT_2 * back,
+        Bars::Around { .. } if off.x < off.y => Vec2::new(back.x, 0.0),
+        Bars::Around { .. } => Vec2::new(0.0, back.y),
+    };
+    let room = |way: f32, half: f32, at: f32| {
+        if way == 0.0 { f32::INFINITY } else { (half - way.signum() * at) / way.abs() }
+    };
+    let [x, y] = [room(towards.x, half.x, at.x), room(towards.y, half.y, at.y)];
+    towards * x.min(y).min(most)
 }
 
 /// A bar in every corner, the others spread over the sides by their lengths.
@@ -318,6 +373,67 @@ mod tests {
             let (at, other) = (one.at.abs(), next.at.abs());
             assert!((one.at.distance(next.at) - 0.02).abs() < 1e-6, "{one:?} {next:?}");
             assert!(at.max(other).cmple(Vec2::new(0.15, 0.25) + 1e-6).all(), "{one:?} {next:?}");
+        }
+    }
+
+    /// Hooks go off the faces of their bars, in corners off both, and keep the cover of all faces.
+    #[test]
+    fn hooks_lie_within_the_steel_around_them() {
+        let bars = |side_deg: Option<f32>| match side_deg {
+            None => Bars::Around {
+                count: 8,
+                diameter_mm: 20.0,
+                from: 0.0,
+                to: 1.0,
+                ends: [BarEnd::Straight, BarEnd::Hooked],
+                laps: Vec::new(),
+            },
+            Some(side_deg) => Bars::Row {
+                side_deg,
+                count: 3,
+                diameter_mm: 20.0,
+                inset_mm: 0.0,
+                from: 0.0,
+                to: 1.0,
+                ends: [BarEnd::Straight, BarEnd::Hooked],
+                laps: Vec::new(),
+                f_y_mpa: None,
+            },
+        };
+        let r = |side_deg| Reinforcement {
+            cover_mm: 40.0,
+            steel: "B500B".into(),
+            f_y_mpa: None,
+            bars: vec![bars(side_deg)],
+            stirrups: None,
+            bond: Bond::Perfect,
+        };
+        let square = Outline::Rectangle(Vec2::new(0.2, 0.3));
+        for (outline, side_deg, half) in [
+            (square, None, Vec2::new(0.15, 0.25)),
+            (square, Some(0.0), Vec2::new(0.15, 0.25)),
+            (square, Some(90.0), Vec2::new(0.15, 0.25)),
+            (Outline::Round(0.1), None, Vec2::splat(0.05)),
+        ] {
+            for bar in super::bars(outline, &r(side_deg), 3.0) {
+                let shape = bar.shape(3.0, 0.04);
+                let turn = bar.inward.normalize();
+                let end = bar.at + turn * shape[shape.len() - 1].x;
+                assert!(end.abs().cmple(half + 1e-5).all(), "{bar:?} {end}");
+                assert!(shape.iter().all(|p| p.z <= 2.95 + 1e-5), "{shape:?}");
+                let deep = 0.18_f32.min(bar.inward.length());
+                assert!((end.distance(bar.at) - deep).abs() < 1e-5, "{bar:?} {end}");
+                let across = turn.abs();
+                match side_deg {
+                    Some(0.0) => assert!(across.x > 0.999, "{bar:?}"),
+                    Some(_) => assert!(across.y > 0.999, "{bar:?}"),
+                    None => assert!(bar.at.dot(turn) < 0.0, "{bar:?}"),
+                }
+            }
+        }
+        let straight = Reinforcement { bars: vec![Bars::around(8, 20.0)], ..r(None) };
+        for bar in super::bars(square, &straight, 3.0) {
+            assert_eq!(bar.shape(3.0, 0.04), [0.04 * Vec3::Z, (3.0 - 0.04) * Vec3::Z]);
         }
     }
 

@@ -150,7 +150,8 @@ pub enum BarEnd {
     Anchored,
     /// By a bend, a hook or a loop (EN 1992-1-1, 8.4.1): it does not slip either. The tenths of a
     /// millimetre by which a hook gives way are left out, and in compression, where 8.4.1 (3) counts
-    /// no hook, the concrete before it holds as well.
+    /// no hook, the concrete before it holds as well. It is drawn, and seen by X-rays, as a hook of
+    /// 90° that is bent inwards at the end of the bar.
     Hooked,
     /// By bond alone: it slips.
     Straight,

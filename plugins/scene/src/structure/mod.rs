@@ -9,6 +9,7 @@ mod date;
 mod gauge;
 mod georeference;
 mod grade;
+mod hook;
 mod observation;
 mod photograph;
 mod project;
@@ -23,6 +24,7 @@ pub use date::{Date, DateError};
 pub use gauge::*;
 pub use georeference::{Georeference, MapOrigin};
 pub use grade::{Grade, StrandGrade};
+pub(crate) use hook::bent;
 pub use observation::*;
 pub use photograph::Photographed;
 pub use project::Project;
@@ -110,7 +112,7 @@ pub struct SteelLine {
     pub part: Part,
     /// Diameter of the bar, m; of a tendon its duct.
     pub diameter: f32,
-    /// Points of its axis in the world, m. Closed ones end where they begin.
+    /// Points of its axis in the world, m, without hooks. Closed ones end where they begin.
     pub line: Vec<Vec3>,
     /// Of a bar or stirrup: what it is made of.
     pub grade: Option<Grade>,
@@ -118,12 +120,14 @@ pub struct SteelLine {
     pub bond: Bond,
     /// How its first and its last end hold, where it slips.
     pub ends: [BarEnd; 2],
+    /// Towards where hooked ends are bent, as long as there is room, m; zero: no hook is drawn.
+    pub inward: Vec3,
     /// How a tendon is stressed.
     pub prestress: Option<Prestress>,
 }
 
 impl SteelLine {
-    /// One of no known grade, without prestress and perfectly bonded. Its diameter and its points
+    /// One of no known grade, without hooks or prestress and perfectly bonded. Its diameter and its points
     /// are in m.
     #[must_use]
     pub fn new(name: String, part: Part, diameter: f32, line: Vec<Vec3>) -> Self {
@@ -135,8 +139,16 @@ impl SteelLine {
             grade: None,
             bond: Bond::Perfect,
             ends: [BarEnd::Anchored; 2],
+            inward: Vec3::ZERO,
             prestress: None,
         }
+    }
+
+    /// Points of its axis as it is bent: with the hooks of its hooked ends (EN 1992-1-1, 8.3 and
+    /// 8.4.1).
+    #[must_use]
+    pub fn bent(&self) -> Vec<Vec3> {
+        bent(&self.line, self.ends, self.inward, self.diameter)
     }
 }
 

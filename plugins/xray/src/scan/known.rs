@@ -110,8 +110,15 @@ pub(super) fn solids(
         }
     };
     let mut solids = vec![Solid { shape: body, label: 0 }];
-    for bar in bars.iter().filter(|b| b.line.len() == 2).take(BARS) {
-        let (a, b) = (bar.line[0], bar.line[1]);
+    // Of what is bent, hooks and stirrups, nothing is taken but the straight run of a bar.
+    let run = |bar: &Bar| {
+        let is_straight = bar.line.len() == 2;
+        let pieces = bar.line.windows(2).map(|w| (w[0], w[1]));
+        pieces
+            .filter(|_| is_straight || bar.ribbed)
+            .max_by(|(a, b), (c, d)| a.distance(*b).total_cmp(&c.distance(*d)))
+    };
+    for (bar, (a, b)) in bars.iter().filter_map(|b| Some((b, run(b)?))).take(BARS) {
         let within = |p: DVec3| p.z.abs() <= half && outline.within(p) > 0.0;
         let (low, high) = if a.z < b.z { (a, b) } else { (b, a) };
         let cut = |p: DVec3, q: DVec3, z: f64| {

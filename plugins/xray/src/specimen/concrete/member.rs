@@ -207,7 +207,7 @@ impl Outline {
 fn bars(steel: &[SteelLine], place: &Place, recipe: &Recipe) -> Vec<Bar> {
     let (reach, end) = (recipe.outline.reach() + 0.05, 0.5 * recipe.height + 0.05);
     let line = |l: &SteelLine| {
-        let points: Vec<DVec3> = l.line.iter().map(|p| place.local(*p)).collect();
+        let points: Vec<DVec3> = l.bent().into_iter().map(|p| place.local(p)).collect();
         // Of a tendon's duct, what its strands fill.
         let radius = match &l.prestress {
             Some(p) => (f64::from(p.strands) * f64::from(p.strand_mm2) * 1e-6

@@ -1,5 +1,7 @@
+use std::sync::Arc;
+
 use glam::{DVec2, DVec3};
-use intrados_scene::Scene;
+use intrados_scene::{Part, Scene, structure::BarEnd};
 use intrados_stage::{Job, random::Key};
 
 use super::*;
@@ -271,6 +273,25 @@ fn concrete_has_its_weight() {
             * (0.7 * 2650.0 + 0.3 * 1900.0);
         assert!((mean / expected - 1.0).abs() < 0.01, "{finest}: {mean} {expected}");
     }
+}
+
+/// A hook is where its bar ends; elsewhere the bar is as straight as any.
+#[test]
+fn hooks_are_seen_where_bars_end() {
+    let mut scene = Scene::load_bundled("column", &Job::default()).unwrap();
+    let column = &mut Arc::make_mut(&mut scene.structure).assemblies[0];
+    let (id, start) = (column.id.clone(), column.frame.start);
+    for line in column.steel.iter_mut().filter(|l| l.part == Part::Bar) {
+        line.ends[1] = BarEnd::Hooked;
+        line.inward = start - line.line[0];
+    }
+    let points = |along: f32| -> Vec<usize> {
+        let member = Subject::of(&scene, &id).unwrap();
+        let (recipe, _) = of_member(member, along, 0.58, 0.09, 4e-3, 1).unwrap();
+        recipe.bars.iter().filter(|b| b.ribbed).map(|b| b.line.len()).collect()
+    };
+    assert_eq!(points(0.5), [2; 12]);
+    assert_eq!(points(0.985), [7; 12]);
 }
 
 #[test]
