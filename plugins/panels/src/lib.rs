@@ -14,6 +14,7 @@ mod command;
 mod convergence;
 mod create;
 mod ct;
+mod destination;
 mod dialog;
 mod directions;
 mod drops;

@@ -135,6 +135,51 @@ fn all_views_are_saved_into_a_folder() {
     assert!(slice.is_some(), "{files:?}");
 }
 
+/// Who saves something types its name at once, over the one that was proposed; Escape saves nothing,
+/// and Enter does.
+#[test]
+fn a_name_is_typed_at_once_and_enter_saves_under_it() {
+    let (mut window, folder) = with_lonely();
+    window.until("a scene", |w| w.contains_resource::<CurrentScene>());
+    let begin = |window: &mut Window| {
+        window.ask(Action::Save(Taken::Values("covers", "along,mm\n0.5,31\n".into())));
+        window.frames(4);
+    };
+    let name =
+        |window: &Window| window.harness.query_by_label("File to write").map(|field| field.value());
+    begin(&mut window);
+    window.harness.event(Event::Text("pier 7".into()));
+    window.frames(2);
+    assert_eq!(name(&window), Some(Some("pier 7.csv".into())));
+    window.harness.key_press(Key::Escape);
+    window.frames(3);
+    assert_eq!(name(&window), None);
+    begin(&mut window);
+    let file = folder.path().join("covers.csv");
+    type_into(&mut window, "File to write", &file.display().to_string());
+    window.harness.key_press(Key::Enter);
+    window.until("the table", |_| file.exists());
+    assert_eq!(fs::read_to_string(&file).expect("a table"), "along,mm\n0.5,31\n");
+    window.frames(2);
+    assert_eq!(name(&window), None);
+}
+
+/// Of what is written into a folder, a folder is asked for.
+#[test]
+fn a_folder_is_chosen_where_a_folder_is_written() {
+    let mut window = with_column();
+    for (what, asked) in [
+        (Taken::Views, "type the folder's name instead"),
+        (Taken::Picture(None), "type the file's name instead"),
+    ] {
+        window.ask(Action::Save(what));
+        window.frames(4);
+        window.click("Browse…");
+        window.frames(2);
+        assert!(has(&window, asked), "{asked}");
+    }
+}
+
 /// A digit is a side of the structure, but an estimator where the picture of light is seen; the
 /// legend goes and comes by a key, and so do the slices.
 #[test]
