@@ -35,6 +35,7 @@ mod members;
 mod meters;
 mod moment;
 mod number;
+mod one_line;
 mod orbit;
 mod outline;
 mod photos;

@@ -10,15 +10,15 @@ use intrados_forecast::ForecastSettings;
 use intrados_light::Render;
 use intrados_mechanics::plugin::{Analyses, ShownAt};
 use intrados_panels::{
-    Action, Latest, Lengths, Log, Look, PanelsPlugin, Refine, Selection, Taken, Viewpoint,
-    Workspace,
+    Action, Latest, Lengths, Log, Look, PanelsPlugin, Refine, Selection, Statistics, Taken,
+    Viewpoint, Workspace,
 };
 use intrados_predict::{PredictSettings, Predicting};
 use intrados_scene::{Camera, Part, Scene, parametric::write_glb, plugin::CurrentScene};
 use intrados_stage::{Job, Jobs, Task, Work};
 
 use super::{
-    Dropped, LONELY, Window, export,
+    Dropped, LONELY, PATIENCE, Window, export,
     forms::{EARLIER, with_seen},
     press, rest, type_into, with_column, with_lonely,
 };
@@ -794,8 +794,6 @@ fn a_border_is_refined_alone() {
     assert_eq!(rect, rect_now);
     let drawn = [at(0.25, 0.5), at(0.75, 0.75)];
     draw(&mut window, drawn[0], drawn[1]);
-    // A line of text above it may have come or gone meanwhile.
-    let rect = window.harness.get_by_label("Picture").rect();
     let [low, high] = drawn.map(|at| (at - rect.min) / rect.size());
     window.until("the part", |w| w.resource::<Render>().camera().width < whole.width);
     window.until("its light", |w| w.resource::<Render>().samples_per_pixel() > 2.0);
@@ -811,6 +809,34 @@ fn a_border_is_refined_alone() {
     assert_eq!(window.with(|w| w.resource::<Viewpoint>().camera().cloned()), camera);
     window.harness.key_press(Key::Escape);
     window.until("all of it", |w| *w.resource::<Render>().camera() == whole);
+}
+
+/// However much is said above the picture of light, it stays where it is: in a narrow window, too,
+/// from the first preview to the figures of both sides.
+#[test]
+fn what_is_said_above_the_picture_does_not_move_it() {
+    let mut window = Window::with_scene("column");
+    window.harness.set_size(egui::vec2(760.0, 600.0));
+    window.frames(6);
+    let place = |window: &Window| window.harness.get_by_label("Picture").rect();
+    let before = place(&window);
+    window.harness.key_press(Key::F);
+    let mut previewed = false;
+    for _ in 0..PATIENCE {
+        window.frame();
+        assert_eq!(place(&window), before);
+        let (is_preview, is_known) = window.with(|w| {
+            (w.resource::<Viewpoint>().is_preview(), w.resource::<Statistics>().now().is_some())
+        });
+        previewed |= is_preview;
+        if previewed && !is_preview && is_known {
+            window.frames(2);
+            assert_eq!(place(&window), before);
+            return;
+        }
+        rest();
+    }
+    panic!("nothing is known of the picture");
 }
 
 /// The wheel enlarges a picture and its reference alike, where a camera that comes nearer would let
