@@ -884,13 +884,7 @@ fn images_that_are_let_go_on_no_member_may_be_its_slices() {
     let (mut window, folder) = with_lonely();
     window.until("a scene", |w| w.contains_resource::<CurrentScene>());
     window.frames(3);
-    let corner = egui::pos2(2.0, 2.0);
-    window.harness.hover_at(corner);
-    for name in ["a.tif", "b.tif"] {
-        let file = folder.path().join(name);
-        image::GrayImage::from_pixel(32, 32, image::Luma([120])).save(&file).expect("a file");
-        window.harness.input_mut().dropped_files.push(Arc::new(Dropped(file)));
-    }
+    let_go(&mut window, folder.path(), &["a.tif", "b.tif"]);
     window.until_seen("If they are CT slices, select their member.");
     assert!(has(&window, "2 files were let go on no member: b.tif is open in Photos."));
     window.click("Photograph a.tif");
@@ -901,6 +895,45 @@ fn images_that_are_let_go_on_no_member_may_be_its_slices() {
     window.until_seen("to Column 1");
     assert!(has(&window, "a.tif") && has(&window, "b.tif"));
     assert!(!has(&window, "were let go on no member"));
+}
+
+/// Lets files go where no member is: tables that are empty, and images.
+fn let_go(window: &mut Window, folder: &Path, names: &[&str]) {
+    window.harness.hover_at(egui::pos2(2.0, 2.0));
+    for file in names.iter().map(|name| folder.join(name)) {
+        if file.extension().is_some_and(|ending| ending == "csv") {
+            fs::write(&file, "").expect("written");
+        } else {
+            image::GrayImage::from_pixel(32, 32, image::Luma([120])).save(&file).expect("a file");
+        }
+        window.harness.input_mut().dropped_files.push(Arc::new(Dropped(file)));
+    }
+}
+
+/// Of several photographs one is opened and the others are offered; what goes together with nothing
+/// is refused, and so are photographs of no structure.
+#[test]
+fn no_photograph_that_is_let_go_is_passed_over() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut alone = Window::new(|_| {});
+    alone.frames(2);
+    let_go(&mut alone, folder.path(), &["a.jpg", "b.jpg"]);
+    alone.frames(3);
+    assert!(has(&alone, "photographs, slices and tables are of a structure"));
+    drop(alone);
+    let (mut window, folder) = with_lonely();
+    window.until("a scene", |w| w.contains_resource::<CurrentScene>());
+    window.frames(3);
+    let_go(&mut window, folder.path(), &["a.jpg", "b.jpg"]);
+    window.until_seen("2 photographs were let go: b.jpg is open in Photos.");
+    assert!(!has(&window, "If they are CT slices"));
+    window.click("Photograph a.jpg");
+    assert!(has(&window, "2 photographs were let go: a.jpg is open in Photos."));
+    window.click("Dismiss");
+    assert!(!has(&window, "were let go"));
+    let_go(&mut window, folder.path(), &["a.jpg", "covers.csv"]);
+    window.frames(3);
+    assert!(has(&window, "photographs together, and slices or tables together"));
 }
 
 /// What was framed in half of the panel, beside an earlier prediction, is seen as a whole when it has
