@@ -218,7 +218,7 @@ fn carry_out(world: &mut World, action: Action) {
         Action::Choose => Dialogs::open(world, Purpose::Open),
         Action::New => world.resource_mut::<Creation>().begin(),
         Action::ChooseExport => {
-            let name = world.resource::<Export>().path.clone();
+            let name = world.resource::<Export>().to.path.clone();
             Dialogs::open(world, Purpose::Save(name));
         }
         Action::Save(what) => {
@@ -228,8 +228,10 @@ fn carry_out(world: &mut World, action: Action) {
             }
         }
         Action::ChooseSave => {
-            let name = world.resource::<Saving>().proposal();
-            Dialogs::open(world, Purpose::Take(name));
+            let saving = world.resource::<Saving>();
+            let purpose = if saving.is_folder() { Purpose::Folder } else { Purpose::Take };
+            let purpose = purpose(saving.proposal());
+            Dialogs::open(world, purpose);
         }
         Action::TakePicture(path, panel) => take_picture(world, Some(path), panel),
         Action::TakeViews(folder) => world.resource_mut::<Saving>().take_views(folder),

@@ -7,7 +7,7 @@ use egui::{
     TextureHandle, Ui, Vec2, pos2,
 };
 
-use intrados_light::plugin::{ActiveCamera, Lit};
+use intrados_scene::plugin::SceneChanged;
 
 use crate::{Viewpoint, line, picture::Picture};
 
@@ -33,12 +33,8 @@ pub(crate) fn end(world: &mut World) -> bool {
 }
 
 /// Another scene has no part of this one.
-pub(crate) fn leave(
-    lit: Option<Res<Lit>>,
-    active: Option<Res<ActiveCamera>>,
-    mut border: ResMut<Border>,
-) {
-    if lit.is_some_and(|lit| lit.is_changed()) && active.is_some_and(|it| it.is_changed()) {
+pub(crate) fn leave(mut changed: MessageReader<SceneChanged>, mut border: ResMut<Border>) {
+    if changed.read().last().is_some() {
         border.forget();
     }
 }

@@ -38,6 +38,8 @@ pub(crate) enum Purpose {
     Save(String),
     /// The same of what is no picture of light.
     Take(String),
+    /// The same of what is a folder of files.
+    Folder(String),
 }
 
 impl Purpose {
@@ -67,6 +69,15 @@ impl Purpose {
                 .add_filter(tr!("EXR, with all data"), &["exr"])
                 .set_file_name(name),
             Self::Take(name) => dialog.set_title(tr!("Save")).set_file_name(name),
+            Self::Folder(name) => {
+                let dialog =
+                    dialog.set_title(tr!("Folder to write")).set_can_create_directories(true);
+                let proposed = std::path::absolute(name.trim()).unwrap_or_default();
+                match proposed.parent().filter(|above| above.is_dir()) {
+                    Some(above) => dialog.set_directory(above),
+                    None => dialog,
+                }
+            }
         }
     }
 }
@@ -100,6 +111,7 @@ impl Dialogs {
         let task = Task::spawn_unlisted(&mut jobs, tr!("file dialog"), move |_| match theirs {
             Purpose::Evidence => dialog.pick_files().unwrap_or_default(),
             Purpose::Save(_) | Purpose::Take(_) => dialog.save_file().into_iter().collect(),
+            Purpose::Folder(_) => dialog.pick_folder().into_iter().collect(),
             Purpose::Open | Purpose::Photograph | Purpose::Prediction => {
                 dialog.pick_file().into_iter().collect()
             }
@@ -138,6 +150,7 @@ fn is_missing(purpose: &Purpose, banners: &mut Banners, log: &mut Log) {
         Purpose::Photograph => tr!("drop the photograph on the window, or type its path"),
         Purpose::Prediction => tr!("drop its predict.json on the window"),
         Purpose::Save(_) | Purpose::Take(_) => tr!("type the file's name instead"),
+        Purpose::Folder(_) => tr!("type the folder's name instead"),
     };
     log.say(tr!("no file dialog on this system: {}", instead));
     banners.cannot(&tr!("No file dialog on this system"), &instead);
@@ -165,8 +178,8 @@ pub(crate) fn take(
         (Purpose::Open, Some(path)) => actions.ask(Action::Open(path)),
         (Purpose::Photograph, Some(path)) => actions.ask(Action::Photograph(path)),
         (Purpose::Prediction, Some(path)) => actions.ask(Action::Compare(path)),
-        (Purpose::Take(_), Some(path)) => saving.put(&path),
-        (Purpose::Save(_), Some(path)) => export.path = path.display().to_string(),
+        (Purpose::Take(_) | Purpose::Folder(_), Some(path)) => saving.put(path),
+        (Purpose::Save(_), Some(path)) => export.to.propose(path.display().to_string()),
         (purpose, None) if since.elapsed() < TOO_SOON => {
             is_missing(purpose, &mut banners, &mut log)
         }

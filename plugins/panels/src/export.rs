@@ -17,6 +17,7 @@ use intrados_transport::Side;
 
 use crate::{
     Action, Actions, Banners, Log, Look, Quantity,
+    destination::Destination,
     fields::{self, Fields, Painted},
     lang::{local, term},
     leaf::{Drawing, Leaf},
@@ -37,7 +38,7 @@ pub struct Exporter(pub Arc<Write>);
 #[derive(Resource, Default)]
 pub(crate) struct Export {
     pub(crate) shown: bool,
-    pub(crate) path: String,
+    pub(crate) to: Destination,
     task: Option<Task<Result<Written, String>>>,
 }
 
@@ -50,9 +51,10 @@ struct Written {
 impl Export {
     pub(crate) fn toggle(&mut self, scene: &str) {
         self.shown = !self.shown;
-        if self.path.is_empty() {
-            self.path = format!("{}.png", file_name(scene));
+        if self.to.path.is_empty() {
+            self.to.path = format!("{}.png", file_name(scene));
         }
+        self.to.take_keyboard();
     }
 
     pub(crate) fn is_busy(&self) -> bool {
@@ -75,15 +77,15 @@ pub(crate) fn sheet(
         "PNG: the picture as it is shown now. EXR: linear radiance with its variance, samples and \
          orders."
     ));
-    ui.horizontal(|ui| {
-        let label = ui.label(tr!("File name"));
-        ui.add(egui::TextEdit::singleline(&mut export.path).desired_width(280.0))
-            .labelled_by(label.id);
+    let is_entered = ui.horizontal(|ui| {
+        let is_entered = export.to.field(ui, tr!("File name"));
         if ui.button(tr!("Browse…")).clicked() {
             actions.ask(Action::ChooseExport);
         }
+        is_entered
     });
-    let path = PathBuf::from(export.path.trim());
+    let is_entered = is_entered.inner;
+    let path = PathBuf::from(export.to.path.trim());
     let kind =
         path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
     let problem = match (kind.as_str(), &render, &exporter) {
@@ -98,8 +100,12 @@ pub(crate) fn sheet(
     };
     let is_writing = export.task.is_some().then(|| tr!("Another file is being written."));
     let problem = problem.or(is_writing);
+    if is_entered && problem.is_some() {
+        export.to.take_keyboard();
+    }
     ui.horizontal(|ui| {
-        if ui.add_enabled(problem.is_none(), egui::Button::new(tr!("Save"))).clicked()
+        let button = ui.add_enabled(problem.is_none(), egui::Button::new(tr!("Save")));
+        if (button.clicked() || is_entered && problem.is_none())
             && let Some(render) = render
         {
             export.shown = false;

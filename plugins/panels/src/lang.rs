@@ -8,7 +8,10 @@
 //! Three languages that know one and many at most need no grammar: where that differs, the code has
 //! two messages.
 
-use std::{cell::Cell, collections::HashMap, fmt::Display, ops::RangeInclusive, sync::OnceLock};
+use std::{
+    cell::Cell, collections::HashMap, fmt::Display, ops::RangeInclusive, str::FromStr,
+    sync::OnceLock,
+};
 
 use egui::{DragValue, Slider, emath::Numeric};
 use serde::{Deserialize, Serialize};
@@ -234,7 +237,7 @@ pub(crate) fn local(number: String) -> String {
 }
 
 /// A number as somebody types it, with a point or a comma.
-fn typed(text: &str) -> Option<f64> {
+pub(crate) fn typed<T: FromStr>(text: &str) -> Option<T> {
     let text: String = text.chars().filter(|c| !c.is_whitespace()).collect();
     text.replace('−', "-").replace(',', ".").parse().ok()
 }
@@ -242,13 +245,13 @@ fn typed(text: &str) -> Option<f64> {
 /// A field for a number, shown and read as the language writes it.
 pub(crate) fn drag<N: Numeric>(value: &mut N) -> DragValue<'_> {
     let shown = |x, decimals| local(egui::emath::format_with_decimals_in_range(x, decimals));
-    DragValue::new(value).custom_formatter(shown).custom_parser(typed)
+    DragValue::new(value).custom_formatter(shown).custom_parser(typed::<f64>)
 }
 
 /// A slider, shown and read as the language writes numbers.
 pub(crate) fn slide<N: Numeric>(value: &mut N, range: RangeInclusive<N>) -> Slider<'_> {
     let shown = |x, decimals| local(egui::emath::format_with_decimals_in_range(x, decimals));
-    Slider::new(value, range).custom_formatter(shown).custom_parser(typed)
+    Slider::new(value, range).custom_formatter(shown).custom_parser(typed::<f64>)
 }
 
 #[cfg(test)]
@@ -380,6 +383,9 @@ mod tests {
         assert_eq!(fixed(0.25, 2), "0,25");
         speak(Language::English);
         assert_eq!(fixed(0.25, 2), "0.25");
-        assert_eq!((typed("0,25"), typed("−1.5"), typed("x")), (Some(0.25), Some(-1.5), None));
+        assert_eq!(
+            (typed("0,25"), typed("−1.5"), typed::<f64>("x")),
+            (Some(0.25), Some(-1.5), None)
+        );
     }
 }

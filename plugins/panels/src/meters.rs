@@ -66,14 +66,15 @@ fn rows(ui: &mut Ui, reading: &MeterReading) {
             .into_iter()
             .flatten()
             .all(|side| side.evidence.holds());
-        gap(ui, z, trusted);
+        let (gap, what) = gap(z, trusted);
+        ui.label(gap).on_hover_text(what);
         ui.end_row();
     }
 }
 
-/// A duality gap: (primal − dual) in standard errors, and what to think of it if both error bars
-/// are `trusted`.
-pub(crate) fn gap(ui: &mut Ui, z: f64, trusted: bool) {
+/// A duality gap, (primal − dual) in standard errors, as it is said, and what to think of it; both
+/// hang on whether both error bars are `trusted`.
+pub(crate) fn gap(z: f64, trusted: bool) -> (String, String) {
     let (mark, what) = match z.abs() {
         _ if !trusted => (
             tr!("(too early)"),
@@ -86,5 +87,5 @@ pub(crate) fn gap(ui: &mut Ui, z: f64, trusted: bool) {
         z if z < 3.0 => (String::new(), tr!("one pair in 22 is this far apart by chance")),
         _ => ("⚠".into(), tr!("the two sides contradict each other, or an error bar is too small")),
     };
-    ui.label(format!("{} σ {mark}", local(format!("{z:+.1}")))).on_hover_text(what);
+    (format!("{} σ {mark}", local(format!("{z:+.1}"))), what)
 }

@@ -1,7 +1,7 @@
 //! The picture, its tools, and the hand on the camera.
 
 use bevy_ecs::prelude::*;
-use egui::{Color32, PointerButton, Pos2, Rect, Sense, Ui, pos2, vec2};
+use egui::{Color32, PointerButton, Pos2, Rect, RichText, Sense, Ui, pos2, vec2};
 use glam::Vec3;
 use intrados_light::{
     ORDERS, Render, Trust, View,
@@ -16,13 +16,16 @@ use crate::{
     fields::{self, Fields},
     lang::{drag, fixed, slide, term},
     light_line::LightLine,
+    meters,
     number::{count, duration, percent, plus_minus},
+    one_line::{self, Piece},
     orbit,
     outline::Outline,
     picture::{self, Cursor, Picture, Under},
     reference::{self, Reference},
     scale::{self, Ranges},
     smooth::{self, Smoothed},
+    statistics::Now,
     steering,
 };
 
@@ -354,7 +357,7 @@ fn steered(
             let (seen, unit) = (painted.scale.range, fields::meaning(side)[1]);
             scale::lock(ui, ranges, fields::name(side), seen, unit, true);
         }
-        ui.weak(steering::state(learning));
+        one_line::put(ui, vec![Piece::new(RichText::new(steering::state(learning)).weak())]);
     });
 }
 
@@ -393,6 +396,7 @@ fn bounces(ui: &mut Ui, look: &mut Look) {
         .on_hover_text(tr!("One term of the Neumann series alone: light after so many bounces"));
 }
 
+/// Two lines, however much there is to be said: the picture stays where it is.
 fn status(
     ui: &mut Ui,
     look: &Look,
@@ -404,71 +408,78 @@ fn status(
     let now = statistics.now().filter(|_| !viewpoint.is_preview());
     let Some(now) = now else {
         let why = if viewpoint.is_preview() { tr!("Preview") } else { "…".into() };
-        ui.horizontal(|ui| ui.weak(why));
-        ui.horizontal(|ui| ui.weak(" "));
+        one_line::say(ui, vec![Piece::new(RichText::new(why).weak())]);
+        one_line::say(ui, vec![Piece::new(" ")]);
         return;
     };
-    ui.horizontal_wrapped(|ui| {
-        let there = refine.is_there(statistics);
-        ui.strong(match () {
-            () if refine.paused => tr!("⏸ Paused"),
-            () if there => tr!("✔ Target reached"),
-            () => tr!("Refining"),
-        });
-        if !there && now.error() <= refine.target {
-            ui.label(tr!("target reached, but by an error bar that may not be trusted"))
-                .on_hover_text(term(&now.trust.words()));
-        } else if !there && now.error().is_finite() {
-            let left = duration(refine.seconds_left(now.error()));
-            ui.label(tr!("target in {}", left)).on_hover_text(tr!(
-                "By the law of large numbers: the error falls with the root of the time"
-            ));
-        }
-        ui.separator();
-        let samples = count(now.samples_per_pixel);
-        ui.label(match render.map(|r| r.camera()) {
-            Some(c) => tr!("{} × {} pixels, {} samples each", c.width, c.height, samples),
-            None => tr!("{} samples each", samples),
-        });
-        ui.separator();
-        let work = fixed(now.cpu_seconds, 1);
-        ui.label(format!("{}, {work} CPU-s", duration(refine.seconds)));
-    });
-    ui.horizontal_wrapped(|ui| {
-        if let Some(reading) = now.reading(look.view) {
-            let mean = plus_minus(reading.mean, reading.std_error, "W/(m² sr)");
-            ui.label(tr!("Mean {}", mean)).on_hover_text(tr!("Mean luminance of the picture"));
-            if reading.rel_error().is_finite() {
-                let [error, half] = [1.0, HALF_WIDTH].map(|k| percent(k * reading.rel_error()));
-                ui.label(tr!("({}; 95 %: ± {})", error, half)).on_hover_text(tr!(
-                    "Relative standard error of the mean, and half the width of its 95 % interval. A single pixel's error is about {}.",
-                    percent(now.pixel_noise())
-                ));
-            }
-            if look.view == View::Combined {
-                ui.weak(now.mixture());
-            }
-            ui.separator();
-        }
-        if let Some(z) = now.z {
-            ui.label(tr!("Gap"));
-            crate::meters::gap(ui, z, now.both_converged);
-            ui.separator();
-        }
-        convergence(ui, &now.trust);
-    });
+    one_line::say(ui, going(now, refine, refine.is_there(statistics), render));
+    one_line::say(ui, known(now, look));
 }
 
-fn convergence(ui: &mut Ui, trust: &Trust) {
+/// How far the picture is, and what that took.
+fn going(now: &Now, refine: &Refine, there: bool, render: Option<&Render>) -> Vec<Piece> {
+    let state = match () {
+        () if refine.paused => tr!("⏸ Paused"),
+        () if there => tr!("✔ Target reached"),
+        () => tr!("Refining"),
+    };
+    let mut pieces = vec![Piece::new(RichText::new(state).strong())];
+    if !there && now.error() <= refine.target {
+        let but = tr!("target reached, but by an error bar that may not be trusted");
+        pieces.push(Piece::new(but).hint(term(&now.trust.words())));
+    } else if !there && now.error().is_finite() {
+        let left = duration(refine.seconds_left(now.error()));
+        let hint = tr!("By the law of large numbers: the error falls with the root of the time");
+        pieces.push(Piece::new(tr!("target in {}", left)).hint(hint));
+    }
+    let samples = count(now.samples_per_pixel);
+    let size = match render.map(|r| r.camera()) {
+        Some(c) => tr!("{} × {} pixels, {} samples each", c.width, c.height, samples),
+        None => tr!("{} samples each", samples),
+    };
+    let work = fixed(now.cpu_seconds, 1);
+    let took = format!("{}, {work} CPU-s", duration(refine.seconds));
+    pieces.extend([size, took].map(|text| Piece::new(text).apart()));
+    pieces
+}
+
+/// What is known of the picture. Whether that may be trusted stands first, and is elided last.
+fn known(now: &Now, look: &Look) -> Vec<Piece> {
+    let mut pieces = vec![convergence(&now.trust)];
+    if let Some(reading) = now.reading(look.view) {
+        let mean = plus_minus(reading.mean, reading.std_error, "W/(m² sr)");
+        let mean = Piece::new(tr!("Mean {}", mean)).hint(tr!("Mean luminance of the picture"));
+        pieces.push(mean.apart());
+        if reading.rel_error().is_finite() {
+            let [error, half] = [1.0, HALF_WIDTH].map(|k| percent(k * reading.rel_error()));
+            let hint = tr!(
+                "Relative standard error of the mean, and half the width of its 95 % interval. A single pixel's error is about {}.",
+                percent(now.pixel_noise())
+            );
+            pieces.push(Piece::new(tr!("({}; 95 %: ± {})", error, half)).hint(hint));
+        }
+        if look.view == View::Combined {
+            pieces.push(Piece::new(RichText::new(now.mixture()).weak()));
+        }
+    }
+    if let Some(z) = now.z {
+        let (gap, what) = meters::gap(z, now.both_converged);
+        pieces.push(Piece::new(tr!("Gap")).apart());
+        pieces.push(Piece::new(gap).hint(what));
+    }
+    pieces
+}
+
+fn convergence(trust: &Trust) -> Piece {
     if trust.is_certified() {
-        ui.label(tr!("✔ Converged")).on_hover_text(tr!(
+        Piece::new(tr!("✔ Converged")).hint(tr!(
             "No walk dominates, the halves agree, the tail of the scores is light, and the other \
              side has met no light that is missing: the error bar may be trusted"
-        ));
+        ))
     } else if trust.is_settled() {
-        ui.label(tr!("Converged, not checked")).on_hover_text(term(&trust.words()));
+        Piece::new(tr!("Converged, not checked")).hint(term(&trust.words()))
     } else {
-        ui.label(tr!("⚠ Not converged"))
-            .on_hover_text(tr!("The error bar may be too small: {}", term(&trust.words())));
+        Piece::new(tr!("⚠ Not converged"))
+            .hint(tr!("The error bar may be too small: {}", term(&trust.words())))
     }
 }

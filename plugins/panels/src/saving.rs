@@ -8,7 +8,7 @@ use std::{
 };
 
 use bevy_ecs::prelude::*;
-use egui::{Button, ColorImage, Rect, TextEdit, Ui};
+use egui::{Button, ColorImage, Rect, Ui};
 use intrados_predict::Prediction;
 use intrados_report::{pdf, tables};
 use intrados_scene::plugin::CurrentScene;
@@ -18,8 +18,8 @@ use intrados_stage::{
 };
 
 use crate::{
-    Action, Actions, Banners, Latest, Log, album, export::write_png, lang::term, report,
-    toast::Toasts,
+    Action, Actions, Banners, Latest, Log, album, destination::Destination, export::write_png,
+    lang::term, report, toast::Toasts,
 };
 
 /// So long tools are put away for a picture: where the system gives none, they come back.
@@ -40,6 +40,13 @@ pub enum Taken {
     Views,
 }
 
+impl Taken {
+    /// Whether it is a folder of files.
+    fn is_folder(&self) -> bool {
+        matches!(self, Self::Report | Self::Views)
+    }
+}
+
 /// What was written, and where to; of a report, how many files.
 pub(crate) struct Written {
     pub(crate) files: Option<usize>,
@@ -50,7 +57,7 @@ pub(crate) struct Written {
 #[derive(Resource, Default)]
 pub(crate) struct Saving {
     shown: Option<Taken>,
-    path: String,
+    to: Destination,
     with_pdf: bool,
     /// None: somebody cancelled it.
     task: Option<Task<Result<Option<Written>, String>>>,
@@ -69,12 +76,12 @@ impl Saving {
     /// Asks where to.
     pub(crate) fn ask(&mut self, what: Taken, scene: &str) {
         let name = file_name(scene);
-        self.path = match &what {
+        self.to.propose(match &what {
             Taken::Report => format!("{name}-damage"),
             Taken::Table(table) | Taken::Values(table, _) => format!("{name}-{table}.csv"),
             Taken::Picture(_) => format!("{name}.png"),
             Taken::Views => format!("{name}-views"),
-        };
+        });
         self.shown = Some(what);
     }
 
@@ -93,12 +100,18 @@ impl Saving {
 
     /// Where it would go.
     pub(crate) fn proposal(&self) -> String {
-        self.path.clone()
+        self.to.path.clone()
+    }
+
+    /// Whether that is a folder.
+    pub(crate) fn is_folder(&self) -> bool {
+        self.shown.as_ref().is_some_and(Taken::is_folder)
     }
 
     /// Where a dialog says.
-    pub(crate) fn put(&mut self, path: &Path) {
-        self.path = path.display().to_string();
+    pub(crate) fn put(&mut self, path: PathBuf) {
+        let path = if self.is_folder() { inside(path, &self.to.path) } else { path };
+        self.to.propose(path.display().to_string());
     }
 
     /// Takes a picture of the window, or of what is at a place in it, in the next frame, for a file
@@ -116,6 +129,17 @@ impl Saving {
     pub(crate) fn takes_panel(&self) -> bool {
         self.wanted.as_ref().is_some_and(|(_, of)| of.is_some())
             && self.since.is_some_and(|since| since.elapsed() < AWAY)
+    }
+}
+
+/// The folder that is written where somebody has chosen one: itself where it is empty or of the
+/// proposal's name, or else one of that name in it, so that files of others are not mixed with ours.
+fn inside(folder: PathBuf, proposal: &str) -> PathBuf {
+    let name = Path::new(proposal.trim()).file_name();
+    let is_empty = folder.read_dir().is_ok_and(|mut files| files.next().is_none());
+    match name {
+        Some(name) if !is_empty && folder.file_name() != Some(name) => folder.join(name),
+        _ => folder,
     }
 }
 
@@ -182,7 +206,6 @@ pub(crate) fn sheet(
     let saving = saving.bypass_change_detection();
     let (Some(what), Some(scene)) = (saving.shown.clone(), scene) else { return };
     let is_report = what == Taken::Report;
-    let is_folder = is_report || what == Taken::Views;
     ui.label(match &what {
         Taken::Report => {
             tr!("HTML, BCF, tables and models, as `intrados predict --out` writes them.")
@@ -193,14 +216,15 @@ pub(crate) fn sheet(
         Taken::Picture(_) => tr!("PNG, as it is seen now."),
         Taken::Views => of_views(),
     });
-    ui.horizontal(|ui| {
-        let name = if is_folder { tr!("Folder to write") } else { tr!("File to write") };
-        let label = ui.label(name);
-        ui.add(TextEdit::singleline(&mut saving.path).desired_width(280.0)).labelled_by(label.id);
+    let name = if what.is_folder() { tr!("Folder to write") } else { tr!("File to write") };
+    let is_entered = ui.horizontal(|ui| {
+        let is_entered = saving.to.field(ui, name);
         if ui.button(tr!("Browse…")).clicked() {
             actions.ask(Action::ChooseSave);
         }
+        is_entered
     });
+    let is_entered = is_entered.inner;
     if is_report {
         let can = pdf::printer().is_some();
         ui.add_enabled_ui(can, |ui| ui.checkbox(&mut saving.with_pdf, tr!("and report.pdf")));
@@ -210,7 +234,7 @@ pub(crate) fn sheet(
     }
     let result = latest.result_for(&scene.0).cloned();
     let needs = matches!(what, Taken::Report | Taken::Table(_));
-    let why_not = if saving.path.trim().is_empty() {
+    let why_not = if saving.to.path.trim().is_empty() {
         Some(tr!("It needs a name."))
     } else if needs && result.is_none() {
         Some(tr!("The prediction is not done yet."))
@@ -219,9 +243,13 @@ pub(crate) fn sheet(
     } else {
         None
     };
+    if is_entered && why_not.is_some() {
+        saving.to.take_keyboard();
+    }
     ui.horizontal(|ui| {
-        if ui.add_enabled(why_not.is_none(), Button::new(tr!("Save"))).clicked() {
-            let path = PathBuf::from(saving.path.trim());
+        let save = ui.add_enabled(why_not.is_none(), Button::new(tr!("Save")));
+        if save.clicked() || is_entered && why_not.is_none() {
+            let path = PathBuf::from(saving.to.path.trim());
             match (what, result) {
                 (Taken::Picture(panel), _) => actions.ask(Action::TakePicture(path, panel)),
                 (Taken::Views, _) => actions.ask(Action::TakeViews(path)),
@@ -381,6 +409,20 @@ mod tests {
     use egui::{Color32, pos2};
 
     use super::*;
+
+    #[test]
+    fn a_folder_with_files_of_others_gets_one_of_its_own() {
+        let folder = tempfile::tempdir().unwrap();
+        let chosen = folder.path().to_owned();
+        assert_eq!(inside(chosen.clone(), "bridge-damage"), chosen);
+        std::fs::write(chosen.join("letter.txt"), "").unwrap();
+        let own = chosen.join("bridge-damage");
+        assert_eq!(inside(chosen.clone(), "elsewhere/bridge-damage "), own);
+        std::fs::create_dir(&own).unwrap();
+        std::fs::write(own.join("report.html"), "").unwrap();
+        assert_eq!(inside(own.clone(), "bridge-damage"), own);
+        assert_eq!(inside(chosen.clone(), ""), chosen);
+    }
 
     #[test]
     fn a_picture_is_cut_in_pixels_and_never_beyond_its_rim() {

@@ -38,6 +38,20 @@ impl Values {
         self.fields.is_empty()
     }
 
+    /// Takes the fields as the file has them now. What has been typed stays where the file still
+    /// says what it did.
+    pub(crate) fn renew(&mut self, fields: Vec<Field>) {
+        let before = std::mem::replace(self, Self::new(fields));
+        let typed = before.fields.iter().zip(before.texts);
+        for ((old, text), (new, own)) in typed.zip(self.fields.iter().zip(&mut self.texts)) {
+            let is_same =
+                (&old.group, &old.name, &old.value) == (&new.group, &new.name, &new.value);
+            if is_same {
+                *own = text;
+            }
+        }
+    }
+
     /// Back to what is written.
     pub(crate) fn discard(&mut self) {
         *self = Self::new(std::mem::take(&mut self.fields));
@@ -194,9 +208,16 @@ mod tests {
         values.texts[1].push('7');
         let typed = values.typed();
         assert_eq!(typed.len(), 1);
-        let mut again = Values::new(all);
+        let mut again = Values::new(all.clone());
         again.type_again(&typed);
         assert_eq!((again.changed(), &again.texts), (1, &values.texts));
+        let mut now = all;
+        again.renew(now.clone());
+        assert_eq!((again.changed(), &again.texts), (1, &values.texts));
+        // Somebody has written another value there meanwhile.
+        now[1].value.push('9');
+        again.renew(now.clone());
+        assert_eq!((again.changed(), &again.texts[1]), (0, &now[1].value));
         let mut other = Values::new(fields(&scene, None));
         other.type_again(&typed);
         assert_eq!(other.changed(), 0);

@@ -6,7 +6,7 @@ use intrados_light::{
     Render, RenderSettings, Sides, View,
     plugin::{ActiveCamera, Lit},
 };
-use intrados_scene::Camera;
+use intrados_scene::{Camera, plugin::SceneChanged};
 
 use crate::{Look, Refine, orbit, picture::Picture};
 
@@ -108,8 +108,10 @@ impl Viewpoint {
 }
 
 /// Takes over the large film once it is there, and a camera that somebody else has set: the one of
-/// a new scene.
+/// a new scene. The same scene with other damage brings none: what is active then is our own.
 pub(crate) fn adopt(
+    mut changed: MessageReader<SceneChanged>,
+    mut is_coming: Local<bool>,
     lit: Option<Res<Lit>>,
     render: Option<Res<Render>>,
     active: Option<Res<ActiveCamera>>,
@@ -117,6 +119,7 @@ pub(crate) fn adopt(
     mut look: ResMut<Look>,
     mut picture: ResMut<Picture>,
 ) {
+    *is_coming |= changed.read().last().is_some();
     let (Some(lit), Some(active)) = (lit, active) else { return };
     if viewpoint.awaits && render.is_some_and(|r| Some(r.camera()) == viewpoint.sent.as_ref()) {
         viewpoint.awaits = false;
@@ -125,10 +128,12 @@ pub(crate) fn adopt(
             picture.keep_as_underlay();
         }
     }
-    if !active.is_changed() || viewpoint.sent.as_ref() == Some(&active.0) && !lit.is_changed() {
+    let is_new = lit.is_changed() && std::mem::take(&mut *is_coming);
+    let is_own = viewpoint.sent.as_ref() == Some(&active.0);
+    if !is_new && (!active.is_changed() || is_own) {
         return;
     }
-    if lit.is_changed() {
+    if is_new {
         viewpoint.home = Some(active.0.clone());
         look.exposure = active.0.exposure;
         look.order = None;

@@ -7,10 +7,6 @@ use glam::DVec3;
 
 use crate::{Photograph, Pick};
 
-/// Standard error of a corner of a tag, pixels: that of the paper's edge on the concrete, and of
-/// the lines that are fitted to it.
-pub const TAG_PX: f64 = 0.5;
-
 /// A tag that a table places.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TagAt {

@@ -120,7 +120,8 @@ fn tags_place_a_photograph() {
         focal: Some(Focal { px: pose.focal_px, rel_error: 0.02 }),
         lens: Lens::default(),
         k1_error: 0.05,
-        picking_px: intrados_photo::tags::TAG_PX,
+        // The paper's edge on the concrete, and the lines that are fitted to it.
+        picking_px: 0.5,
     };
     let located = locate(&picks, &prior, &|pose| site.admits(pose, &picks)).unwrap();
     let off = located.pose.position.distance(pose.position);

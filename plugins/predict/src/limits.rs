@@ -8,7 +8,7 @@ use intrados_damage::{
     ledger,
     verdict::{Basis, NAMED},
 };
-use intrados_forecast::FORECAST;
+use intrados_forecast::{FORECAST, MODEL_ERROR};
 use intrados_scene::{Scene, structure::Matter};
 
 use crate::{Origin, prediction::MemberPrediction};
@@ -43,7 +43,7 @@ pub(crate) fn limits(
         limits.push("Members hand loads on as an elastic frame of whole sections does: what cracks and hands its load to others, and what falls, is not in the forecast.".to_owned());
     }
     if members.iter().any(|m| m.capacity.is_some()) {
-        limits.push(OF_STRENGTH.to_owned());
+        limits.push(of_strength());
     }
     let not_raised =
         |(name, why): &(&str, &str)| format!("The strength of {name} was not computed: {why}.");
@@ -111,7 +111,12 @@ pub(crate) fn limits(
 }
 
 /// How strength is computed, and what that leaves out.
-const OF_STRENGTH: &str = "Strength is that of mean materials as they are today (concrete gains with age), without safety factors, with bars that do not slip; zones that have lost concrete bear so much less in every direction, all zones are taken to err together, and pits of rust count as even loss. Its error bar has 10 % for the model.";
+fn of_strength() -> String {
+    format!(
+        "Strength is that of mean materials as they are today (concrete gains with age), without safety factors, with bars that do not slip; zones that have lost concrete bear so much less in every direction, all zones are taken to err together, and pits of rust count as even loss. Its error bar has {:.0} % for the model.",
+        100.0 * MODEL_ERROR
+    )
+}
 
 /// So many members.
 fn many(n: usize) -> String {

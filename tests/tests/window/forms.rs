@@ -109,6 +109,30 @@ fn bars_are_lapped_in_the_sheet_and_whole_again() {
     assert_eq!(fs::read_to_string(&file).expect("the scene"), LONELY);
 }
 
+/// What has been typed stays in the sheet while evidence is attached, and goes once it is written.
+#[test]
+fn what_is_typed_stays_while_evidence_is_attached() {
+    let (mut window, _folder) = with_seen();
+    opened(&mut window);
+    type_into(&mut window, "width", "0,55");
+    window.click("Attach evidence…");
+    window.until_seen("Fill in its width, mm.");
+    type_into(&mut window, "width, mm", "0.9");
+    window.click("Attach");
+    window.until("the scene with it", |w| {
+        w.resource::<CurrentScene>().0.structure.observations.len() == 2
+    });
+    window.frames(3);
+    let typed = |window: &Window| window.harness.get_by_label("width").value();
+    assert_eq!(typed(&window).as_deref(), Some("0,55"));
+    assert!(has(&window, "one value changed"));
+    window.click("Apply");
+    window.until("the wider column", |w| is(w, 0.55));
+    window.frames(3);
+    assert_eq!(typed(&window).as_deref(), Some("0.55"));
+    assert!(has(&window, "as in lonely.ron"));
+}
+
 /// What the file would be refused for is refused with its line; nothing is written, and what was
 /// typed stays, to be mended.
 #[test]

@@ -1181,6 +1181,50 @@ fn a_scan_can_be_stopped() {
     });
 }
 
+/// Leaves a crack on a member.
+fn crack(world: &mut World) {
+    let (entity, member) = world
+        .query::<(Entity, &Member)>()
+        .iter(world)
+        .next()
+        .map(|(e, m)| (e, m.clone()))
+        .expect("members");
+    let front = member.bounds[1].z;
+    let mouth = [-0.1, 0.1].map(|x| Mouth {
+        at: Vec3::new(member.frame.start.x + x, 1.5, front),
+        outward: Vec3::Z,
+        width: 1e-3,
+    });
+    let crack = CrackSurface { mouth: mouth.to_vec(), normal: Vec3::Y, depth: 0.1 };
+    let damage = SurfaceDamage { member: member.id, cracks: vec![crack], spalls: Vec::new() };
+    world.entity_mut(entity).insert(damage);
+}
+
+/// Cracks that come while the camera moves, and is a small one, leave the scene's camera its home.
+#[test]
+fn cracks_that_come_while_the_camera_moves_leave_its_home() {
+    let mut window = Window::with_scene("column");
+    let hash = |w: &mut World| w.get_resource::<Lit>().map(|lit| lit.0.scene.hash.clone());
+    let (before, home) = window.with(|w| (hash(w), w.resource::<Viewpoint>().home.clone()));
+    assert!(before.is_some() && home.is_some());
+    window.with(crack);
+    window.until("the damaged scene", |w| {
+        let is_there = hash(w) != before;
+        let mut viewpoint = w.resource_mut::<Viewpoint>();
+        let mut camera = viewpoint.camera().cloned().expect("a scene has a camera");
+        camera.position.x += 1e-3;
+        viewpoint.go(camera);
+        is_there
+    });
+    window.until("the large picture", |w| !w.resource::<Viewpoint>().is_preview());
+    let (now, camera) = window.with(|w| {
+        let viewpoint = w.resource::<Viewpoint>();
+        (viewpoint.home.clone(), viewpoint.camera().cloned())
+    });
+    assert_eq!(now, home);
+    assert_eq!(camera.map(|c| c.width), home.map(|c| c.width));
+}
+
 /// What mechanics leaves on a member is in the picture, which goes on from where the camera is.
 #[test]
 fn cracks_come_into_the_picture() {
@@ -1188,26 +1232,7 @@ fn cracks_come_into_the_picture() {
     let before = window.with(|w| {
         (w.resource::<Lit>().0.scene.hash.clone(), w.resource::<ActiveCamera>().0.clone())
     });
-    window.with(|w| {
-        let (entity, member) = w
-            .query::<(Entity, &Member)>()
-            .iter(w)
-            .next()
-            .map(|(e, m)| (e, m.clone()))
-            .expect("members");
-        let front = member.bounds[1].z;
-        let mouth = [-0.1, 0.1].map(|x| Mouth {
-            at: Vec3::new(member.frame.start.x + x, 1.5, front),
-            outward: Vec3::Z,
-            width: 1e-3,
-        });
-        let crack = CrackSurface { mouth: mouth.to_vec(), normal: Vec3::Y, depth: 0.1 };
-        w.entity_mut(entity).insert(SurfaceDamage {
-            member: member.id,
-            cracks: vec![crack],
-            spalls: Vec::new(),
-        });
-    });
+    window.with(crack);
     window.until("the damaged scene", |w| {
         w.get_resource::<Lit>().is_some_and(|l| l.0.scene.hash != before.0)
     });

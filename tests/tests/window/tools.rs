@@ -10,15 +10,15 @@ use intrados_forecast::ForecastSettings;
 use intrados_light::Render;
 use intrados_mechanics::plugin::{Analyses, ShownAt};
 use intrados_panels::{
-    Action, Latest, Lengths, Log, Look, PanelsPlugin, Refine, Selection, Taken, Viewpoint,
-    Workspace,
+    Action, Latest, Lengths, Log, Look, PanelsPlugin, Refine, Selection, Statistics, Taken,
+    Viewpoint, Workspace,
 };
 use intrados_predict::{PredictSettings, Predicting};
 use intrados_scene::{Camera, Part, Scene, parametric::write_glb, plugin::CurrentScene};
 use intrados_stage::{Job, Jobs, Task, Work};
 
 use super::{
-    Dropped, LONELY, Window, export,
+    Dropped, LONELY, PATIENCE, Window, export,
     forms::{EARLIER, with_seen},
     press, rest, type_into, with_column, with_lonely,
 };
@@ -133,6 +133,51 @@ fn all_views_are_saved_into_a_folder() {
         .collect();
     let slice = files.iter().find(|name| name.starts_with("ct-") && name.contains("slice_1"));
     assert!(slice.is_some(), "{files:?}");
+}
+
+/// Who saves something types its name at once, over the one that was proposed; Escape saves nothing,
+/// and Enter does.
+#[test]
+fn a_name_is_typed_at_once_and_enter_saves_under_it() {
+    let (mut window, folder) = with_lonely();
+    window.until("a scene", |w| w.contains_resource::<CurrentScene>());
+    let begin = |window: &mut Window| {
+        window.ask(Action::Save(Taken::Values("covers", "along,mm\n0.5,31\n".into())));
+        window.frames(4);
+    };
+    let name =
+        |window: &Window| window.harness.query_by_label("File to write").map(|field| field.value());
+    begin(&mut window);
+    window.harness.event(Event::Text("pier 7".into()));
+    window.frames(2);
+    assert_eq!(name(&window), Some(Some("pier 7.csv".into())));
+    window.harness.key_press(Key::Escape);
+    window.frames(3);
+    assert_eq!(name(&window), None);
+    begin(&mut window);
+    let file = folder.path().join("covers.csv");
+    type_into(&mut window, "File to write", &file.display().to_string());
+    window.harness.key_press(Key::Enter);
+    window.until("the table", |_| file.exists());
+    assert_eq!(fs::read_to_string(&file).expect("a table"), "along,mm\n0.5,31\n");
+    window.frames(2);
+    assert_eq!(name(&window), None);
+}
+
+/// Of what is written into a folder, a folder is asked for.
+#[test]
+fn a_folder_is_chosen_where_a_folder_is_written() {
+    let mut window = with_column();
+    for (what, asked) in [
+        (Taken::Views, "type the folder's name instead"),
+        (Taken::Picture(None), "type the file's name instead"),
+    ] {
+        window.ask(Action::Save(what));
+        window.frames(4);
+        window.click("Browse…");
+        window.frames(2);
+        assert!(has(&window, asked), "{asked}");
+    }
 }
 
 /// A digit is a side of the structure, but an estimator where the picture of light is seen; the
@@ -749,8 +794,6 @@ fn a_border_is_refined_alone() {
     assert_eq!(rect, rect_now);
     let drawn = [at(0.25, 0.5), at(0.75, 0.75)];
     draw(&mut window, drawn[0], drawn[1]);
-    // A line of text above it may have come or gone meanwhile.
-    let rect = window.harness.get_by_label("Picture").rect();
     let [low, high] = drawn.map(|at| (at - rect.min) / rect.size());
     window.until("the part", |w| w.resource::<Render>().camera().width < whole.width);
     window.until("its light", |w| w.resource::<Render>().samples_per_pixel() > 2.0);
@@ -766,6 +809,34 @@ fn a_border_is_refined_alone() {
     assert_eq!(window.with(|w| w.resource::<Viewpoint>().camera().cloned()), camera);
     window.harness.key_press(Key::Escape);
     window.until("all of it", |w| *w.resource::<Render>().camera() == whole);
+}
+
+/// However much is said above the picture of light, it stays where it is: in a narrow window, too,
+/// from the first preview to the figures of both sides.
+#[test]
+fn what_is_said_above_the_picture_does_not_move_it() {
+    let mut window = Window::with_scene("column");
+    window.harness.set_size(egui::vec2(760.0, 600.0));
+    window.frames(6);
+    let place = |window: &Window| window.harness.get_by_label("Picture").rect();
+    let before = place(&window);
+    window.harness.key_press(Key::F);
+    let mut previewed = false;
+    for _ in 0..PATIENCE {
+        window.frame();
+        assert_eq!(place(&window), before);
+        let (is_preview, is_known) = window.with(|w| {
+            (w.resource::<Viewpoint>().is_preview(), w.resource::<Statistics>().now().is_some())
+        });
+        previewed |= is_preview;
+        if previewed && !is_preview && is_known {
+            window.frames(2);
+            assert_eq!(place(&window), before);
+            return;
+        }
+        rest();
+    }
+    panic!("nothing is known of the picture");
 }
 
 /// The wheel enlarges a picture and its reference alike, where a camera that comes nearer would let
@@ -813,13 +884,7 @@ fn images_that_are_let_go_on_no_member_may_be_its_slices() {
     let (mut window, folder) = with_lonely();
     window.until("a scene", |w| w.contains_resource::<CurrentScene>());
     window.frames(3);
-    let corner = egui::pos2(2.0, 2.0);
-    window.harness.hover_at(corner);
-    for name in ["a.tif", "b.tif"] {
-        let file = folder.path().join(name);
-        image::GrayImage::from_pixel(32, 32, image::Luma([120])).save(&file).expect("a file");
-        window.harness.input_mut().dropped_files.push(Arc::new(Dropped(file)));
-    }
+    let_go(&mut window, folder.path(), &["a.tif", "b.tif"]);
     window.until_seen("If they are CT slices, select their member.");
     assert!(has(&window, "2 files were let go on no member: b.tif is open in Photos."));
     window.click("Photograph a.tif");
@@ -830,6 +895,45 @@ fn images_that_are_let_go_on_no_member_may_be_its_slices() {
     window.until_seen("to Column 1");
     assert!(has(&window, "a.tif") && has(&window, "b.tif"));
     assert!(!has(&window, "were let go on no member"));
+}
+
+/// Lets files go where no member is: tables that are empty, and images.
+fn let_go(window: &mut Window, folder: &Path, names: &[&str]) {
+    window.harness.hover_at(egui::pos2(2.0, 2.0));
+    for file in names.iter().map(|name| folder.join(name)) {
+        if file.extension().is_some_and(|ending| ending == "csv") {
+            fs::write(&file, "").expect("written");
+        } else {
+            image::GrayImage::from_pixel(32, 32, image::Luma([120])).save(&file).expect("a file");
+        }
+        window.harness.input_mut().dropped_files.push(Arc::new(Dropped(file)));
+    }
+}
+
+/// Of several photographs one is opened and the others are offered; what goes together with nothing
+/// is refused, and so are photographs of no structure.
+#[test]
+fn no_photograph_that_is_let_go_is_passed_over() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut alone = Window::new(|_| {});
+    alone.frames(2);
+    let_go(&mut alone, folder.path(), &["a.jpg", "b.jpg"]);
+    alone.frames(3);
+    assert!(has(&alone, "photographs, slices and tables are of a structure"));
+    drop(alone);
+    let (mut window, folder) = with_lonely();
+    window.until("a scene", |w| w.contains_resource::<CurrentScene>());
+    window.frames(3);
+    let_go(&mut window, folder.path(), &["a.jpg", "b.jpg"]);
+    window.until_seen("2 photographs were let go: b.jpg is open in Photos.");
+    assert!(!has(&window, "If they are CT slices"));
+    window.click("Photograph a.jpg");
+    assert!(has(&window, "2 photographs were let go: a.jpg is open in Photos."));
+    window.click("Dismiss");
+    assert!(!has(&window, "were let go"));
+    let_go(&mut window, folder.path(), &["a.jpg", "covers.csv"]);
+    window.frames(3);
+    assert!(has(&window, "photographs together, and slices or tables together"));
 }
 
 /// What was framed in half of the panel, beside an earlier prediction, is seen as a whole when it has

@@ -3,6 +3,7 @@
 use intrados_scene::structure::Date;
 
 use super::*;
+use crate::lang::typed;
 
 impl Form {
     /// What is attached, or what has to be filled in first.
@@ -106,13 +107,13 @@ impl Form {
     }
 }
 
-/// A number that was typed, with a point or a comma; none: nothing was.
+/// A number that was typed; none: nothing was.
 fn number<T: std::str::FromStr>(name: &str, text: &str) -> Result<Option<T>, String> {
-    let text = text.trim().replace(',', ".");
+    let text = text.trim();
     if text.is_empty() {
         return Ok(None);
     }
-    text.parse().map(Some).map_err(|_| tr!("{}: “{}” is no number", name, text))
+    typed(text).map(Some).ok_or_else(|| tr!("{}: “{}” is no number", name, text))
 }
 
 #[cfg(test)]

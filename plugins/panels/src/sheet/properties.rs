@@ -1,7 +1,7 @@
 //! The form of what a scene's file says of a member, or of the whole structure: its values are
 //! changed here and written there.
 
-use std::sync::Arc;
+use std::{path::PathBuf, sync::Arc};
 
 use bevy_ecs::prelude::*;
 use egui::{Button, Ui};
@@ -18,12 +18,14 @@ use crate::{
 /// What has been typed; of another member or another scene it is begun anew.
 #[derive(Resource, Default)]
 pub(crate) struct Properties {
-    /// The scene's hash, and the member's id.
-    of: (String, Option<String>),
+    /// The scene's file, and the member's id.
+    of: (PathBuf, Option<String>),
+    /// The scene's hash, another one where its evidence or its file has changed.
+    hash: String,
     values: Values,
-    /// What another session has left, and the hash of the scene that it is of; it waits until its
+    /// What another session has left, and the file of the scene that it is of; it waits until its
     /// form is drawn.
-    left: Option<(String, Unapplied)>,
+    left: Option<(PathBuf, Unapplied)>,
 }
 
 /// What has been typed into the form and is not applied.
@@ -37,19 +39,19 @@ pub(crate) struct Unapplied {
 impl Properties {
     /// What has been typed of this scene and is not applied, if anything is.
     pub(crate) fn unapplied(&self, scene: &Scene) -> Option<Unapplied> {
-        let left = self.left.as_ref().filter(|(of, _)| *of == scene.hash);
+        let left = self.left.as_ref().filter(|(of, _)| *of == scene.path);
         if let Some((_, left)) = left {
             return Some(left.clone());
         }
         let (of, member) = &self.of;
         let typed = self.values.typed();
-        let is_typed = *of == scene.hash && !typed.is_empty();
+        let is_typed = *of == scene.path && !typed.is_empty();
         is_typed.then(|| Unapplied { member: member.clone(), typed })
     }
 
     /// Goes on with what another session has left of this scene.
     pub(crate) fn go_on(&mut self, scene: &Scene, left: Unapplied) {
-        *self = Self { left: Some((scene.hash.clone(), left)), ..Self::default() };
+        *self = Self { left: Some((scene.path.clone(), left)), ..Self::default() };
     }
 
     /// Draws it.
@@ -60,11 +62,13 @@ impl Properties {
         member: Option<&Member>,
         actions: &mut Actions,
     ) {
-        let of = (scene.hash.clone(), member.map(|m| m.id.clone()));
+        let of = (scene.path.clone(), member.map(|m| m.id.clone()));
         if self.of != of {
             self.values = Values::new(fields(scene, member));
-            self.of = of;
+        } else if self.hash != scene.hash {
+            self.values.renew(fields(scene, member));
         }
+        (self.of, self.hash) = (of, scene.hash.clone());
         let left = self.left.take_if(|(of, left)| (&*of, &left.member) == (&self.of.0, &self.of.1));
         if let Some((_, left)) = left {
             self.values.type_again(&left.typed);

@@ -237,13 +237,18 @@ impl Predictor {
             }
             Some(Item::Slice(_)) => format!("reading slice {} of {slices}", self.next + 1),
             Some(Item::Life(_)) => self.label_of(&self.lives()),
-            Some(Item::Strength(model)) => format!("the strength of {}", self.name(model)),
+            Some(Item::Strength(model)) => self.label_of_strength(model),
             Some(Item::Gauges(_)) => "what strain gauges say".into(),
             Some(Item::Survey(_)) => "what was surveyed".into(),
             Some(Item::Photograph(..)) => "what a photograph shows".into(),
             Some(Item::Outside(source, ..)) => format!("what {} says", source.name()),
             None => String::new(),
         }
+    }
+
+    /// What people call what a model bears.
+    fn label_of_strength(&self, model: &str) -> String {
+        format!("the strength of {}", self.name(model))
     }
 
     /// What people call the lives of some models.
@@ -413,7 +418,7 @@ impl Predictor {
     /// What a model bears with what is known of its members by now.
     fn raise(&mut self, scene: &Scene, model: &str, job: &Job) -> Result<(), PredictError> {
         self.join(scene, job)?;
-        job.relabel(format!("the strength of {}", self.name(model)));
+        job.relabel(self.label_of_strength(model));
         let members = scene.structure.assembly(model).into_iter().flat_map(|a| &a.members);
         let losses = members.filter_map(|id| {
             let index = scene.members.iter().position(|m| m.id == *id)?;
