@@ -177,6 +177,9 @@ struct Watch<'a, 'm> {
     history_at_peak: Option<History>,
     /// What there is to see now.
     last: Vec<[Point; 8]>,
+    /// What was seen when the load had first fallen by a tenth since the peak: what comes later is
+    /// what the failure does, not what brings it.
+    fallen: Vec<[Point; 8]>,
     /// Of the last step.
     iterations: usize,
     /// What broke first.
@@ -339,6 +342,7 @@ impl<'a, 'm> Watch<'a, 'm> {
             at_peak: Vec::new(),
             history_at_peak: None,
             last: Vec::new(),
+            fallen: Vec::new(),
             iterations: 0,
             broken: None,
         };
@@ -422,8 +426,12 @@ impl<'a, 'm> Watch<'a, 'm> {
             self.peak = self.curve.len() - 1;
             self.at_peak = points.to_vec();
             self.history_at_peak = Some(history.clone());
+            self.fallen.clear();
         }
         self.last = points.to_vec();
+        if self.fallen.is_empty() && self.has_fallen(&point, FALLS) {
+            self.fallen = points.to_vec();
+        }
         for (steel, works) in self.structure.model.steel.iter().zip(&history.steel) {
             let is_along = !is_stirrup(&steel.name);
             let (bar, tendon) = match &steel.kind {
@@ -616,12 +624,17 @@ impl<'a, 'm> Watch<'a, 'm> {
         Ok((Mode::None, "its load has not fallen, and no bar has yielded".into()))
     }
 
-    /// Σ opening × area of cracks across the axis, oblique and along it that has come since the
-    /// peak, m³.
+    /// What is to be seen while it fails.
+    fn failing(&self) -> &[[Point; 8]] {
+        if self.fallen.is_empty() { &self.last } else { &self.fallen }
+    }
+
+    /// Σ opening × area of cracks across the axis, oblique and along it that has come from the peak
+    /// to its first fall, m³.
     fn opened(&self) -> [f64; 3] {
         let along = self.prepared.direction;
         let mut sums = [0.0; 3];
-        for (hex, (before, now)) in self.at_peak.iter().zip(&self.last).enumerate() {
+        for (hex, (before, now)) in self.at_peak.iter().zip(self.failing()).enumerate() {
             let area = (self.structure.model.mesh.hex_volume(hex as u32) / 8.0).powf(2.0 / 3.0);
             for (before, now) in before.iter().zip(now) {
                 let cosine = glam::DVec3::from_array(now.normal).dot(along).abs().min(1.0);

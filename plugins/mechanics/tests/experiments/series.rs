@@ -9,20 +9,52 @@
 //! width, depth (550 mm there), span, f_c, five bars of 28.5 mm in two rows and their 552 MPa
 //! (github.com/EdilsonMoraisSilva/RC-NonLinear-FEM-Q9, examples/example3_kang, after Kang 1977). It
 //! counts the 64 mm to the underside of the lower bars, where we count them to their middle.
+//!
+//! N1-N (ACI Structural Journal, September 1996, by its own word): ten No. 30 bars 65 and 125 mm
+//! above the bottom, two No. 10 on top, stirrups of 8 mm, loaded in the middle: all of it as in
+//! `examples/dm-n1n.rsp` of the package mcft 0.1.0 (PyPI), a file of E. C. Bentz; plates as of the
+//! others.
 
 use intrados_mechanics::strength::Strength;
 use intrados_stage::cpu_seconds;
 
 use super::*;
 
-/// A beam of Bresler and Scordelis.
+/// Steel of a beam: diameters in mm, yield stresses in MPa.
+struct Inside {
+    bars: [f64; 2],
+    top: [f64; 2],
+    stirrups: [f64; 2],
+    /// Of the stirrups, mm.
+    cover: f64,
+    /// From the lower to the upper row, mm.
+    inset: f64,
+}
+
+const BRESLER: Inside = Inside {
+    bars: [28.7, 555.0],
+    top: [12.7, 345.0],
+    stirrups: [6.4, 325.0],
+    cover: 43.2,
+    inset: 63.0,
+};
+const YOON: Inside = Inside {
+    bars: [29.9, 410.0],
+    top: [11.3, 410.0],
+    stirrups: [8.0, 430.0],
+    cover: 42.0,
+    inset: 60.0,
+};
+
+/// A beam on two supports, loaded in the middle.
 struct Beam {
     name: &'static str,
+    inside: Inside,
     /// Width, depth, span, mm.
     size: [f64; 3],
     /// MPa.
     strength: f64,
-    /// No. 9 bars in the lower and the upper row.
+    /// In the lower and the upper row.
     bars: [u32; 2],
     /// Of stirrups, mm.
     spacing: f64,
@@ -31,9 +63,10 @@ struct Beam {
     mode: &'static str,
 }
 
-const BEAMS: [Beam; 4] = [
+const BEAMS: [Beam; 5] = [
     Beam {
         name: "A1",
+        inside: BRESLER,
         size: [307.0, 561.0, 3660.0],
         strength: 24.1,
         bars: [2, 2],
@@ -43,6 +76,7 @@ const BEAMS: [Beam; 4] = [
     },
     Beam {
         name: "A3",
+        inside: BRESLER,
         size: [307.0, 561.0, 6400.0],
         strength: 35.1,
         bars: [3, 3],
@@ -52,6 +86,7 @@ const BEAMS: [Beam; 4] = [
     },
     Beam {
         name: "B1",
+        inside: BRESLER,
         size: [231.0, 556.0, 3660.0],
         strength: 24.8,
         bars: [2, 2],
@@ -61,12 +96,24 @@ const BEAMS: [Beam; 4] = [
     },
     Beam {
         name: "B3",
+        inside: BRESLER,
         size: [229.0, 556.0, 6400.0],
         strength: 38.8,
         bars: [3, 2],
         spacing: 190.0,
         measured: [356.0, 35.3],
         mode: "crushing",
+    },
+    Beam {
+        name: "N1-N",
+        inside: YOON,
+        size: [375.0, 750.0, 4300.0],
+        strength: 36.0,
+        bars: [5, 5],
+        spacing: 325.0,
+        // Twice its shear of 457 kN; the deflection is not told.
+        measured: [914.0, f64::NAN],
+        mode: "shear",
     },
 ];
 
@@ -78,24 +125,25 @@ fn scene(beam: &Beam) -> String {
     let [low, up] = beam.bars;
     let (fcm, spacing) = (beam.strength, beam.spacing);
     let fck = (fcm - 8.0_f64).max(0.6 * fcm);
-    // Measured from the outside of the stirrups, whose cover puts the lower row 64 mm up.
+    let Inside { bars, top, stirrups, cover, inset } = &beam.inside;
+    // Measured from the outside of the stirrups, whose cover puts the lower row where it was.
     format!(
-        r#"(schema: "intrados.scene/1", title: "{}",
+        r#"(schema: "intrados.scene/1", title: "{6}",
         concretes: [(name: "tested", fck_mpa: {fck}, fcm_mpa: {fcm})],
         members: [(id: "B", concrete: "tested", at: (0, 0, 0), body: Beam(
             section: Rectangle(width_m: {width}, depth_m: {depth}), length_m: {long},
-            reinforcement: (cover_mm: 43.2, bars: [
-                Row(side_deg: 180, count: {low}, diameter_mm: 28.7, f_y_mpa: 555),
-                Row(side_deg: 180, count: {up}, diameter_mm: 28.7, f_y_mpa: 555, inset_mm: 63),
-                Row(side_deg: 0, count: 2, diameter_mm: 12.7, f_y_mpa: 345),
-            ], stirrups: (diameter_mm: 6.4, spacing_mm: {spacing}, f_y_mpa: 325))))],
+            reinforcement: (cover_mm: {cover}, bars: [
+                Row(side_deg: 180, count: {low}, diameter_mm: {0}, f_y_mpa: {1}),
+                Row(side_deg: 180, count: {up}, diameter_mm: {0}, f_y_mpa: {1}, inset_mm: {inset}),
+                Row(side_deg: 0, count: 2, diameter_mm: {2}, f_y_mpa: {3}),
+            ], stirrups: (diameter_mm: {4}, spacing_mm: {spacing}, f_y_mpa: {5}))))],
         supports: [
             (member: "B", place: Surface(from: {support}, to: {support}, side_deg: 180), hold: Directions(x: false, y: true, z: true)),
             (member: "B", place: End, hold: Directions(x: true, y: false, z: false)),
         ],
         loads: [(name: "jack", action: Force(place: Surface(from: {plate}, to: 1, side_deg: 0), force_kn: (0, -50, 0)), history: [(28, 0)])],
         )"#,
-        beam.name
+        bars[0], bars[1], top[0], top[1], stirrups[0], stirrups[1], beam.name
     )
 }
 
@@ -192,7 +240,7 @@ fn beams_with_stirrups() {
                 found.curve.iter().map(|p| (1e3 * p.displacement_m, 2e-3 * p.load_n)).collect();
             draw(
                 &format!("bs-{}{}", beam.name.to_lowercase(), if half { "-fine" } else { "" }),
-                &format!("Beam {} of Bresler and Scordelis", beam.name),
+                &format!("Beam {}", beam.name),
                 ["displacement under the load, mm", "load, kN"],
                 &[
                     Curve { name: "computed".into(), points, marked: false },
