@@ -65,6 +65,52 @@ fn a_bar_vibrates_along_itself_as_waves_do() {
     }
 }
 
+/// The same bar, pulled at its end by 1 Pa from rest: when a wave has come back, both of its modes
+/// are at their farthest, (16/π²)(1 + 1/9) L/M; as long after that they are back. Pulled at a
+/// frequency with damping: Σ 2/(ρL)/(ω² − Ω² + iαΩ).
+#[test]
+fn a_bar_that_is_pulled_swings_as_its_modes_do() {
+    let modulus = E * 0.7 / (1.3 * 0.4);
+    let back = 2.0 * (3.0 / modulus).sqrt();
+    let bar =
+        bar(1.0, 8, 0.3, "C3D20") + "*BOUNDARY\nLOW,1\nALL,2,3\n*STEP\n*FREQUENCY\n2\n*END STEP\n";
+    let moved = format!(
+        "{bar}*STEP\n*MODAL DYNAMIC,DIRECT=NO\n.1,{back:?}\n*DLOAD\n8,P2,-1.\n*END STEP\n*STEP\n*MODAL DYNAMIC\n.01,{back:?}\n*END STEP\n"
+    );
+    let solved = solve(&moved);
+    let end = |of: &Solved| of.displacements.last().unwrap().x;
+    near(end(&solved[1]) * modulus / (16.0 / PI.powi(2) * (1.0 + 1.0 / 9.0)), 1.0, 1e-3);
+    near(end(&solved[2]) * modulus, 0.0, 1e-2);
+    let pace = 4.0 * PI;
+    let shaken = format!(
+        "{bar}*STEP\n*STEADY STATE DYNAMICS\n2.,2.\n*MODAL DAMPING,RAYLEIGH\n,,.7,0.\n*DLOAD\n8,P2,-1.\n*END STEP\n"
+    );
+    let solved = solve(&shaken);
+    let mut expected = [0.0; 2];
+    for n in [1.0, 3.0] {
+        let resists = [(n * 0.5 * PI).powi(2) * modulus / 3.0 - pace * pace, 0.7 * pace];
+        let share = 2.0 / 3.0 / (resists[0].powi(2) + resists[1].powi(2));
+        expected = [expected[0] + share * resists[0], expected[1] - share * resists[1]];
+    }
+    assert_eq!(solved.len(), 3);
+    (0..2).for_each(|i| near(end(&solved[1 + i]) / expected[i], 1.0, 2e-3));
+}
+
+/// A block on a soft spring whose support follows a ramp moves with the ramp, and its modes by what
+/// the ramp's corner left: u = v (t − sin(ωt)/ω).
+#[test]
+fn what_stands_on_a_support_that_moves_is_carried_with_it() {
+    let block = bar(1.0, 1, 1.0, "C3D20")
+        + "*NODE\n900,-1.,0.,0.\n*ELEMENT,TYPE=SPRINGA,ELSET=S\n900,900,1\n*SPRING,ELSET=S\n.3\n\
+           *AMPLITUDE,NAME=A\n0.,0.,9.,9.\n*BOUNDARY\nALL,2,3\n900,1,3\n*STEP\n*FREQUENCY\n1\n*END STEP\n\
+           *STEP\n*MODAL DYNAMIC\n.01,2.\n*BOUNDARY,AMPLITUDE=A\n900,1,1,.5\n*END STEP\n";
+    // All of the block's mass, 3 kg, on .3 N/m, which is far softer than the block.
+    let pace = (0.3f64 / 3.0).sqrt();
+    let solved = solve(&block);
+    let far = solved[1].displacements[12].x;
+    near(far, 0.5 * (2.0 - (2.0 * pace).sin() / pace), 1e-3);
+}
+
 /// Euler's column with a free end: P = π² E I/(4 L²); both planes alike, so that each factor comes
 /// twice.
 #[test]

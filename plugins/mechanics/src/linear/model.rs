@@ -70,6 +70,16 @@ pub(super) struct Spring {
     pub(super) stiffness: f64,
 }
 
+impl Spring {
+    /// Adds its stiffness, row by row.
+    pub(super) fn resist(&self, k: &mut [f64]) {
+        for (row, a) in k.chunks_mut(self.terms.len()).zip(&self.terms) {
+            let force = self.stiffness * a.1;
+            row.iter_mut().zip(&self.terms).for_each(|(k, b)| *k += force * b.1);
+        }
+    }
+}
+
 /// What a material is; a step asks for what it needs.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Material {
@@ -163,6 +173,34 @@ pub(super) enum Procedure {
     },
     /// The smallest factors of the loads at which the structure buckles.
     Buckling { count: usize },
+    /// Motion over time by the modes of the last step of them: in increments of so many seconds, or
+    /// from corner to corner of what acts.
+    Motion { increment: Option<f64>, duration: f64 },
+    /// What stays of vibrations at frequencies between these, Hz: so many of them between two
+    /// modes, the nearer to these the larger the bias.
+    Harmonic { range: [f64; 2], points: u32, bias: f64 },
+}
+
+/// What takes energy from a mode.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(super) enum Damping {
+    #[default]
+    None,
+    /// Rayleigh's: so many times the mass, 1/s, and so many times the stiffness, s.
+    Rayleigh { mass: f64, stiffness: f64 },
+    /// Over critical damping, by mode.
+    Shares(Vec<f64>),
+}
+
+/// What follows one course over time or frequency.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Course {
+    /// Time, s, or frequency, Hz, and factor; none: the factor is one.
+    pub(super) points: Vec<(f64, f64)>,
+    /// Forces where the factor is one, on what does not move where it is supported.
+    pub(super) loads: Step,
+    /// Supports where the factor is one, and no forces.
+    pub(super) base: Step,
 }
 
 /// A way of heating.
@@ -196,6 +234,11 @@ pub(super) struct Step {
     pub(super) kept: BTreeSet<(u32, u8)>,
     /// N.
     pub(super) forces: BTreeMap<(u32, u8), f64>,
+    /// Forces a quarter of a period before them, N.
+    pub(super) early: BTreeMap<(u32, u8), f64>,
+    /// What acts over time or frequency, beside all that.
+    pub(super) courses: Vec<Course>,
+    pub(super) damping: Damping,
     /// Pa, by element and face.
     pub(super) pressures: BTreeMap<(u32, u8), f64>,
     pub(super) pulls: Vec<(u32, Pull)>,

@@ -1,6 +1,6 @@
 //! Steps to displacements and stresses: T ᵀ K T q = Tᵀ (f − K c), factorised.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 use glam::DVec3;
 use intrados_stage::{Cancelled, Job};
@@ -11,7 +11,8 @@ use super::{
     free::Free,
     heat,
     model::{Deck, Procedure, Pull, Step},
-    modes,
+    modes::{self, Mode},
+    vibrate,
 };
 use crate::{
     sparse::{BlockMatrix, Constraints, Method, SolveError, solve},
@@ -94,6 +95,20 @@ pub enum LinearError {
         /// Name of the step.
         step: String,
     },
+    /// Motion by modes of what was held otherwise.
+    #[error("{step}: supports and equations are not those of the step of *FREQUENCY before it")]
+    OtherModes {
+        /// Name of the step.
+        step: String,
+    },
+    /// Vibrations that grow without end.
+    #[error("{step}: without *MODAL DAMPING there is no end to vibrations at {frequency} Hz")]
+    Resonance {
+        /// Name of the step.
+        step: String,
+        /// Hz.
+        frequency: f64,
+    },
     /// Temperatures or modes that do not settle.
     #[error("{step}: {what} do not converge")]
     NotConverged {
@@ -122,39 +137,52 @@ pub(super) struct Past {
     stresses: Vec<Vec<Voigt>>,
     /// Of every node.
     pub(super) temperatures: Vec<f64>,
+    pub(super) modes: Option<vibrate::Modes>,
 }
 
 impl Deck {
-    /// Computes every step.
+    /// Computes every step: what it ends in; where it asks for vibrations, the real and the imaginary
+    /// part at every frequency.
     ///
     /// # Errors
     /// [`LinearError`].
     pub fn solve(&self, job: &Job) -> Result<Vec<Solved>, LinearError> {
         let mut past = Past { temperatures: self.cold.clone(), ..Past::default() };
         let share = self.steps.len() as f64;
-        let solved = self.steps.iter().enumerate().map(|(i, step)| {
+        let mut solved = Vec::new();
+        for (i, step) in self.steps.iter().enumerate() {
             job.step(i, self.steps.len())?;
-            self.step(step, &mut past, &job.part(i as f64 / share, (i + 1) as f64 / share))
-        });
-        solved.collect()
+            let part = job.part(i as f64 / share, (i + 1) as f64 / share);
+            match step.procedure {
+                Procedure::Motion { .. } | Procedure::Harmonic { .. } => {
+                    solved.extend(vibrate::solve(self, step, &mut past, &part)?);
+                }
+                _ => solved.push(self.step(step, &mut past, &part)?),
+            }
+        }
+        Ok(solved)
     }
 
     fn step(&self, step: &Step, past: &mut Past, job: &Job) -> Result<Solved, LinearError> {
         match step.procedure {
-            Procedure::Static => System::new(self, step, past)?.solve(past, job),
             Procedure::Modes { count, heat: true, .. } => heat::modes(self, step, count, job),
             Procedure::Modes { count, stressed, .. } => {
                 let system = System::new(self, step, past)?;
-                system.modes(count, if stressed { &past.stresses } else { &[] }, job)
+                let all = system.modes(count, if stressed { &past.stresses } else { &[] }, job)?;
+                let solved = system.eigenvalues(&all);
+                let order = system.free.order().to_vec();
+                past.modes = Some(vibrate::Modes { order, all, state: Vec::new() });
+                Ok(solved)
             }
             Procedure::Buckling { count } => {
                 let system = System::new(self, step, past)?;
-                system.buckling(count, job)
+                Ok(system.eigenvalues(&system.buckling(count, job)?))
             }
             Procedure::Heat { steady, first, duration } => {
                 let time = (!steady).then_some([first, duration]);
                 heat::solve(self, step, time, &mut past.temperatures, job)
             }
+            _ => System::new(self, step, past)?.solve(past, job),
         }
     }
 
@@ -176,17 +204,17 @@ impl Deck {
 }
 
 /// A step and its constraints.
-struct System<'a> {
+pub(super) struct System<'a> {
     deck: &'a Deck,
     step: &'a Step,
     /// Temperature of every node.
     warm: Vec<f64>,
     /// What is solved for, by elements and after them by springs.
-    free: Free<'a>,
+    pub(super) free: Free<'a>,
 }
 
 impl<'a> System<'a> {
-    fn new(deck: &'a Deck, step: &'a Step, past: &Past) -> Result<Self, LinearError> {
+    pub(super) fn new(deck: &'a Deck, step: &'a Step, past: &Past) -> Result<Self, LinearError> {
         let held = deck.held(step, past);
         // Supports first: equations then bind what is left.
         let later = deck.later.iter().filter(|l| l.0 <= step.number).map(|l| &l.1);
@@ -223,13 +251,54 @@ impl<'a> System<'a> {
                 loads.add(e, &element, &warmth, f)
             }
             Some(spring) => {
-                let spring = &self.deck.springs[spring];
-                for (row, a) in k.chunks_mut(spring.terms.len()).zip(&spring.terms) {
-                    let force = spring.stiffness * a.1;
-                    row.iter_mut().zip(&spring.terms).for_each(|(k, b)| *k += force * b.1);
-                }
+                self.deck.springs[spring].resist(k);
                 Ok(())
             }
+        })
+    }
+
+    /// Forces of what acts on elements and nodes, without those of warmth and of stress from the
+    /// beginning.
+    pub(super) fn forces(&self, job: &Job) -> Result<Vec<f64>, LinearError> {
+        let loads = self.distributed()?;
+        let (_, mut rhs) = self.assembled(job, |e, _, f| {
+            if e < self.deck.cells.len() {
+                loads.add(e, &self.element(e), &self.warmth(e), f)
+            } else {
+                Ok(())
+            }
+        })?;
+        self.nodal(&self.step.forces, &mut rhs)?;
+        Ok(rhs)
+    }
+
+    /// How everything moves with supports that move slowly, and Tᵀ M times that.
+    pub(super) fn carried(&self, job: &Job) -> Result<(Vec<f64>, Vec<f64>), LinearError> {
+        let (stiffness, rhs) =
+            self.assembled(job, |e, k, f| match e.checked_sub(self.deck.cells.len()) {
+                None => {
+                    // Of supports alone: what warms and strains from the beginning is no part of it.
+                    let mut other = vec![0.0; f.len()];
+                    self.element(e).stiffness(&self.warmth(e), |_| tensor::ZERO, k, &mut other)
+                }
+                Some(spring) => {
+                    self.deck.springs[spring].resist(k);
+                    Ok(())
+                }
+            })?;
+        let none = Constraints::new(self.free.count());
+        let found = solve(&stiffness, &rhs, &none, Method::Direct, TOLERANCE, job);
+        let free = found.map_err(|e| self.explained(e))?.x;
+        // Of the mass, what supports push is on the other side: −Tᵀ M c.
+        let (mass, pulled) = self.mass(job)?;
+        let pushed = modes::times(&mass, &free).iter().zip(&pulled).map(|(a, b)| a - b).collect();
+        Ok((self.free.expanded(&free), pushed))
+    }
+
+    fn mass(&self, job: &Job) -> Result<(BlockMatrix<1>, Vec<f64>), LinearError> {
+        let cells = self.deck.cells.len();
+        self.assembled(job, |e, m, _| {
+            if e < cells { self.element(e).mass(&self.warmth(e), m) } else { Ok(()) }
         })
     }
 
@@ -243,29 +312,30 @@ impl<'a> System<'a> {
     }
 
     fn solve(self, past: &mut Past, job: &Job) -> Result<Solved, LinearError> {
-        let (all, stresses, unknowns) = self.moved(job)?;
+        let all = self.moved(job)?;
+        let solved = self.finished(self.step.name.clone(), &all)?;
+        past.displacements = all;
+        past.stresses.clone_from(&solved.stresses);
+        Ok(solved)
+    }
+
+    /// What these displacements of every unknown are to who asked.
+    pub(super) fn finished(&self, name: String, all: &[f64]) -> Result<Solved, LinearError> {
         let places: Vec<DVec3> =
             all.as_chunks::<3>().0.iter().copied().map(DVec3::from_array).collect();
         let displacement = |n: u32| match self.deck.means.get(&n) {
             None => places[n as usize],
             Some(mean) => mean.iter().map(|&(m, share)| share * places[m as usize]).sum(),
         };
-        let displacements = (0..self.deck.labels.len() as u32).map(displacement);
-        past.displacements.clone_from(&all);
-        past.stresses.clone_from(&stresses);
-        Ok(Solved {
-            name: self.step.name.clone(),
-            displacements: displacements.collect(),
-            stresses,
-            unknowns,
-            ..Solved::default()
-        })
+        let displacements = (0..self.deck.labels.len() as u32).map(displacement).collect();
+        let (stresses, unknowns) = (self.stresses(all)?, self.free.count());
+        Ok(Solved { name, displacements, stresses, unknowns, ..Solved::default() })
     }
 
-    /// Displacements of every unknown, stresses, and how many unknowns were solved for.
-    fn moved(&self, job: &Job) -> Result<(Vec<f64>, Vec<Vec<Voigt>>, usize), LinearError> {
+    /// Displacements of every unknown.
+    fn moved(&self, job: &Job) -> Result<Vec<f64>, LinearError> {
         let (matrix, mut rhs) = self.stiffness(job)?;
-        self.nodal(&mut rhs)?;
+        self.nodal(&self.step.forces, &mut rhs)?;
         let none = Constraints::new(self.free.count());
         let solution = if rhs.is_empty() {
             Vec::new()
@@ -277,12 +347,10 @@ impl<'a> System<'a> {
             }
             found.x
         };
-        let all = self.free.expanded(&solution);
-        let stresses = self.stresses(&all)?;
-        Ok((all, stresses, solution.len()))
+        Ok(self.free.expanded(&solution))
     }
 
-    fn floating(&self) -> LinearError {
+    pub(super) fn floating(&self) -> LinearError {
         LinearError::Floating { step: self.step.name.clone() }
     }
 
@@ -302,41 +370,44 @@ impl<'a> System<'a> {
         count: usize,
         stresses: &[Vec<Voigt>],
         job: &Job,
-    ) -> Result<Solved, LinearError> {
+    ) -> Result<Vec<Mode>, LinearError> {
         let (mut stiffness, _) = self.stiffness(job)?;
         if !stresses.is_empty() {
             stiffness.add(1.0, &self.stress_stiffness(stresses, job)?);
         }
-        let cells = self.deck.cells.len();
-        let (mass, _) = self.assembled(job, |e, m, _| {
-            if e < cells { self.element(e).mass(&self.warmth(e), m) } else { Ok(()) }
-        })?;
-        let found = modes::smallest(stiffness, &mass, count, job);
-        self.eigenvalues(found)
+        let (mass, _) = self.mass(job)?;
+        self.smallest(stiffness, &mass, count, job)
     }
 
     /// The smallest factors at which the loads of the step make the structure unstable:
     /// (K + λ K_σ) φ = 0.
-    fn buckling(&self, count: usize, job: &Job) -> Result<Solved, LinearError> {
-        let (_, stresses, _) = self.moved(job)?;
+    fn buckling(&self, count: usize, job: &Job) -> Result<Vec<Mode>, LinearError> {
+        let stresses = self.stresses(&self.moved(job)?)?;
         let (stiffness, _) = self.stiffness(job)?;
         let mut softening = self.stress_stiffness(&stresses, job)?;
         softening.scale(-1.0);
-        let found = modes::smallest(stiffness, &softening, count, job);
-        self.eigenvalues(found)
+        self.smallest(stiffness, &softening, count, job)
     }
 
-    fn eigenvalues(&self, found: Result<Vec<f64>, modes::Failed>) -> Result<Solved, LinearError> {
+    fn smallest(
+        &self,
+        stiffness: BlockMatrix<1>,
+        other: &BlockMatrix<1>,
+        count: usize,
+        job: &Job,
+    ) -> Result<Vec<Mode>, LinearError> {
         let step = self.step.name.clone();
-        let eigenvalues = found.map_err(|failed| match failed {
+        modes::smallest(stiffness, other, count, job).map_err(|failed| match failed {
             modes::Failed::Solve(error) => self.explained(error),
-            modes::Failed::Indefinite => LinearError::Unstable { step: step.clone() },
-            modes::Failed::NotConverged => {
-                LinearError::NotConverged { step: step.clone(), what: "eigenvalues" }
-            }
-        })?;
-        let unknowns = self.free.count();
-        Ok(Solved { name: step, eigenvalues, unknowns, ..Solved::default() })
+            modes::Failed::Indefinite => LinearError::Unstable { step },
+            modes::Failed::NotConverged => LinearError::NotConverged { step, what: "eigenvalues" },
+        })
+    }
+
+    fn eigenvalues(&self, modes: &[Mode]) -> Solved {
+        let (name, unknowns) = (self.step.name.clone(), self.free.count());
+        let eigenvalues = modes.iter().map(|m| m.value).collect();
+        Solved { name, eigenvalues, unknowns, ..Solved::default() }
     }
 
     fn stress_stiffness(
@@ -372,8 +443,12 @@ impl<'a> System<'a> {
     }
 
     /// Adds forces at nodes.
-    fn nodal(&self, rhs: &mut [f64]) -> Result<(), LinearError> {
-        for (&(node, component), &force) in &self.step.forces {
+    pub(super) fn nodal(
+        &self,
+        forces: &BTreeMap<(u32, u8), f64>,
+        rhs: &mut [f64],
+    ) -> Result<(), LinearError> {
+        for (&(node, component), &force) in forces {
             let own = [(node, 1.0)];
             let on = self.deck.shares.get(&node).map_or(&own[..], Vec::as_slice);
             for (unknown, share) in self.deck.component(node, component) {
