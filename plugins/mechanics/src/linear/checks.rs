@@ -2,6 +2,7 @@
 
 use std::{f64::consts::PI, fmt::Write as _, path::Path};
 
+use glam::DVec3;
 use intrados_stage::Job;
 
 use super::{parse, solve::Solved};
@@ -109,6 +110,70 @@ fn what_stands_on_a_support_that_moves_is_carried_with_it() {
     let solved = solve(&block);
     let far = solved[1].displacements[12].x;
     near(far, 0.5 * (2.0 - (2.0 * pace).sin() / pace), 1e-3);
+}
+
+/// One element between planes of symmetry, with sides HIGH at x = 1.
+fn cube(steps: &str) -> String {
+    bar(1.0, 1, 1.0, "C3D20").replace("*DENSITY", "*EXPANSION\n1e-3\n*DENSITY")
+        + "*BOUNDARY\nLOW,1\n1,2,3\n2,3\n4,2\n11,2,3\n12,3\n5,3\n8,2\n14,2\n21,2,3\n22,3\n24,2\n25,3\n28,2\n"
+        + steps
+}
+
+/// Stretched by a fifth: E₁ = .22, E₂ = −ν E₁, σ = E E₁ λ₁/λ₂²; under a pressure on what has become
+/// smaller; warmed by what strains it by a tenth, without stress.
+#[test]
+fn cubes_stretch_far_as_green_and_kirchhoff_say() {
+    let pulled = cube("*STEP,NLGEOM\n*STATIC\n*BOUNDARY\nHIGH,1,1,.2\n*END STEP\n");
+    let solved = solve(&pulled);
+    let across = (1.0f64 - 2.0 * 0.3 * 0.22).sqrt();
+    for stress in solved[0].stresses.iter().flatten() {
+        near(stress[0], E * 0.22 * 1.2 / (across * across), 1e-7);
+        stress[1..].iter().for_each(|s| near(*s, 0.0, 1e-7));
+    }
+    near(solved[0].displacements[2].y, across - 1.0, 1e-9);
+    let pressed = cube("*STEP,NLGEOM\n*STATIC\n*DLOAD\n1,P2,-40.\n*END STEP\n");
+    let long = 1.0 + solve(&pressed)[0].displacements.last().unwrap().x;
+    let green = 0.5 * (long * long - 1.0);
+    near(40.0 * (1.0 - 0.6 * green), E * green * long, 1e-6);
+    let warm = cube("*STEP,NLGEOM\n*STATIC\n*TEMPERATURE\nALL,100.\n*END STEP\n");
+    let solved = solve(&warm);
+    near(solved[0].displacements[2].y, 0.1, 1e-9);
+    solved[0].stresses.iter().flatten().flatten().for_each(|s| near(*s, 0.0, 1e-7));
+}
+
+/// A cantilever under P L²/EI = 2: down by .49346 L and back by .16064 L (Mattiasson 1981); and back
+/// to where it was once the force is gone.
+#[test]
+fn a_cantilever_bends_as_the_elastica() {
+    let (length, width) = (20.0, 0.4);
+    let force = 2.0 * E * f64::powi(width, 4) / 12.0 / (length * length);
+    let [corner, middle] = [-force / 12.0, force / 3.0];
+    let loads: String = (321..=328)
+        .map(|n| format!("{n},3,{:?}\n", if n <= 324 { corner } else { middle }))
+        .collect();
+    let deck = bar(length, 16, width, "C3D20R")
+        + &format!(
+            "*BOUNDARY\nLOW,1,3\n*STEP,NLGEOM\n*STATIC\n*CLOAD\n{loads}*END STEP\n*STEP\n*STATIC\n*CLOAD,OP=NEW\n*END STEP\n"
+        );
+    let solved = solve(&deck);
+    let end = |of: &Solved| {
+        of.displacements[of.displacements.len() - 8..].iter().sum::<DVec3>() / 8.0 / length
+    };
+    near(end(&solved[0]).z, 0.49346, 2e-3);
+    near(end(&solved[0]).x, -0.16064, 2e-3);
+    near(end(&solved[1]).length(), 0.0, 1e-6);
+}
+
+#[test]
+fn beams_are_refused_where_displacements_are_large() {
+    let deck = "*NODE\n1,0,0,0\n2,1,0,0\n*ELEMENT,TYPE=B31,ELSET=ALL\n1,1,2\n\
+                *MATERIAL,NAME=M\n*ELASTIC\n200.,.3\n*BEAM SECTION,ELSET=ALL,MATERIAL=M,SECTION=RECT\n\
+                .1,.1\n*STEP,NLGEOM\n*STATIC\n*END STEP\n";
+    let error = parse(deck.as_bytes(), Path::new("deck.inp"), Units::MetreNewton).unwrap_err();
+    assert!(
+        error.to_string().contains("deck.inp:5: element 1: C3D8I, beams and shells"),
+        "{error}"
+    );
 }
 
 /// Euler's column with a free end: P = π² E I/(4 L²); both planes alike, so that each factor comes

@@ -109,7 +109,9 @@ impl Reader {
             let terms = terms.ok_or_else(|| {
                 card.fault(format!("spring {} has no length, or no component", raw.label))
             })?;
-            self.deck.springs.push(Spring { terms, stiffness });
+            let ends: Option<[u32; 2]> =
+                raw.nodes.as_slice().try_into().ok().filter(|_| link == Link::Between);
+            self.deck.springs.push(Spring { terms, ends, stiffness });
             self.sprung.insert(element);
         }
         Ok(())
@@ -157,6 +159,7 @@ impl Reader {
             nodes.dedup();
             let axis = self.deck.nodes[pilot as usize].try_normalize();
             let axis = axis.ok_or_else(|| row.fault("the axis of MEANROT has no length"))?;
+            self.small.get_or_insert((row.line, "MPC"));
             let places: Vec<DVec3> = nodes.iter().map(|&n| self.deck.nodes[n as usize]).collect();
             let factors = mean_rotation(&places, axis)
                 .ok_or_else(|| row.fault("the nodes of MEANROT lie on one axis"))?;
@@ -191,6 +194,7 @@ impl Reader {
                 turning
             }
         };
+        self.small.get_or_insert((card.line, "RIGID BODY"));
         let origin = self.deck.nodes[reference as usize];
         // Components of a node that turns are angles.
         let unit = if self.turning.contains_key(&reference) { 1.0 } else { self.units.length() };

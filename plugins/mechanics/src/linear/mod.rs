@@ -11,7 +11,7 @@
 //! | materials | `*ELASTIC` (ISO, ORTHO, ANISO, ENGINEERING CONSTANTS), `*EXPANSION`, `*CONDUCTIVITY` (ISO, ORTHO), `*DENSITY`, `*SPECIFIC HEAT`, all by temperature; `*ORIENTATION` |
 //! | constraints | `*BOUNDARY`, `*EQUATION`, `*TRANSFORM`, `*TIE`, `*RIGID BODY`, `*MPC` (MEANROT), `*DISTRIBUTING COUPLING`, `*PRE-TENSION SECTION` |
 //! | loads | `*CLOAD`, `*DLOAD` (P, GRAV, CENTRIF), `*DSLOAD` (P), `*TEMPERATURE`, `*INITIAL CONDITIONS` (TEMPERATURE, STRESS, PLASTIC STRAIN), `*AMPLITUDE`; `*CFLUX`, `*DFLUX`, `*FILM`, `*RADIATE` |
-//! | steps | `*STATIC`, `*FREQUENCY`, `*BUCKLE`, `*HEAT TRANSFER` (steady, in time, FREQUENCY) without `NLGEOM`; `*MODAL DYNAMIC` and harmonic `*STEADY STATE DYNAMICS` by the modes of the `*FREQUENCY` before, with `*MODAL DAMPING`; `OP=MOD` and `OP=NEW` |
+//! | steps | `*STATIC`, `*FREQUENCY`, `*BUCKLE`, `*HEAT TRANSFER` (steady, in time, FREQUENCY), `*STATIC` with `NLGEOM` of solids but C3D8I; `*MODAL DYNAMIC` and harmonic `*STEADY STATE DYNAMICS` by the modes of the `*FREQUENCY` before, with `*MODAL DAMPING`; `OP=MOD` and `OP=NEW` |
 //!
 //! Everything else is refused in one line that names all of it.
 //!
@@ -25,6 +25,7 @@ mod free;
 mod gmsh;
 mod groups;
 mod heat;
+mod large;
 mod law;
 mod link;
 mod matter;

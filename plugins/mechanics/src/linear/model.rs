@@ -66,6 +66,9 @@ pub(super) struct Cell {
 #[derive(Debug, Clone)]
 pub(super) struct Spring {
     pub(super) terms: Vec<(u32, f64)>,
+    /// The two nodes that it lies between, if it turns with the line between them where
+    /// displacements are large.
+    pub(super) ends: Option<[u32; 2]>,
     /// N/m.
     pub(super) stiffness: f64,
 }
@@ -228,6 +231,8 @@ pub(super) struct Step {
     /// From 1.
     pub(super) number: u32,
     pub(super) procedure: Procedure,
+    /// Whether equilibrium is where everything has gone to.
+    pub(super) large: bool,
     /// Components (in the node's own axes) and values, m.
     pub(super) held: BTreeMap<(u32, u8), f64>,
     /// Components that stay where the step before has left them.

@@ -43,6 +43,7 @@ pub fn concerns(bytes: &[u8]) -> bool {
     cards.iter().any(|card| {
         !abaqus::knows(card)
             || card.get("ORIENTATION").is_some()
+            || (card.is("STEP") && card.word("NLGEOM").is_some_and(|word| word != "NO"))
             || (card.is("ELEMENT")
                 && !abaqus::knows_element(&card.word("TYPE").unwrap_or_default()))
     })
@@ -183,6 +184,8 @@ pub(super) struct Reader {
     /// W/(m²·K⁴).
     pub(super) boltzmann: Option<f64>,
     pub(super) tied: bool,
+    /// What is known for small displacements alone: its line and card.
+    pub(super) small: Option<(u32, &'static str)>,
     pub(super) in_material: bool,
     faults: Vec<Fault>,
 }
@@ -206,6 +209,7 @@ impl Reader {
             rings: HashMap::new(),
             boltzmann: None,
             tied: false,
+            small: None,
             in_material: false,
             faults: Vec::new(),
         }

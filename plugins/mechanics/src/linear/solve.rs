@@ -9,8 +9,8 @@ use super::{
     constraint::{Bound, Equation, Sum},
     element::{Element, Folded, Warmth},
     free::Free,
-    heat,
-    model::{Deck, Procedure, Pull, Step},
+    heat, large,
+    model::{Deck, Procedure, Pull, Spring, Step},
     modes::{self, Mode},
     vibrate,
 };
@@ -133,11 +133,20 @@ const TOLERANCE: f64 = 1e-6;
 #[derive(Default)]
 pub(super) struct Past {
     /// Of every unknown; empty before the first step.
-    displacements: Vec<f64>,
-    stresses: Vec<Vec<Voigt>>,
+    pub(super) displacements: Vec<f64>,
+    pub(super) stresses: Vec<Vec<Voigt>>,
+    /// Whether they are of equilibrium where everything has gone to.
+    pub(super) large: bool,
     /// Of every node.
     pub(super) temperatures: Vec<f64>,
     pub(super) modes: Option<vibrate::Modes>,
+}
+
+impl Past {
+    /// Before the first step.
+    pub(super) fn of(deck: &Deck) -> Self {
+        Self { temperatures: deck.cold.clone(), ..Self::default() }
+    }
 }
 
 impl Deck {
@@ -147,7 +156,7 @@ impl Deck {
     /// # Errors
     /// [`LinearError`].
     pub fn solve(&self, job: &Job) -> Result<Vec<Solved>, LinearError> {
-        let mut past = Past { temperatures: self.cold.clone(), ..Past::default() };
+        let mut past = Past::of(self);
         let share = self.steps.len() as f64;
         let mut solved = Vec::new();
         for (i, step) in self.steps.iter().enumerate() {
@@ -167,8 +176,17 @@ impl Deck {
         match step.procedure {
             Procedure::Modes { count, heat: true, .. } => heat::modes(self, step, count, job),
             Procedure::Modes { count, stressed, .. } => {
-                let system = System::new(self, step, past)?;
-                let all = system.modes(count, if stressed { &past.stresses } else { &[] }, job)?;
+                let (system, stiffness) = match stressed {
+                    true if past.large => large::tangent(self, step, past, job)?,
+                    _ => {
+                        let system = System::new(self, step, past)?;
+                        let stresses = if stressed { past.stresses.as_slice() } else { &[] };
+                        let stiffness = system.stiff_under(stresses, job)?;
+                        (system, stiffness)
+                    }
+                };
+                let (mass, _) = system.mass(job)?;
+                let all = system.smallest(stiffness, &mass, count, job)?;
                 let solved = system.eigenvalues(&all);
                 let order = system.free.order().to_vec();
                 past.modes = Some(vibrate::Modes { order, all, state: Vec::new() });
@@ -182,12 +200,13 @@ impl Deck {
                 let time = (!steady).then_some([first, duration]);
                 heat::solve(self, step, time, &mut past.temperatures, job)
             }
+            _ if step.large => large::solve(self, step, past, job),
             _ => System::new(self, step, past)?.solve(past, job),
         }
     }
 
-    /// What is held in a step, as equations.
-    fn held(&self, step: &Step, past: &Past) -> Vec<Equation> {
+    /// What is held in a step, then what binds the rest.
+    pub(super) fn constraints(&self, step: &Step, past: &Past) -> Vec<Equation> {
         let equation = |(node, component), value| Equation {
             terms: self.component(node, component),
             value,
@@ -199,45 +218,54 @@ impl Deck {
             let terms = self.component(node, component);
             equation((node, component), terms.iter().filter_map(place).sum())
         });
-        held.chain(kept).collect()
+        let later = self.later.iter().filter(|l| l.0 <= step.number).map(|l| &l.1);
+        held.chain(kept).chain(self.equations.iter().chain(later).cloned()).collect()
     }
 }
 
 /// A step and its constraints.
 pub(super) struct System<'a> {
-    deck: &'a Deck,
-    step: &'a Step,
+    pub(super) deck: &'a Deck,
+    pub(super) step: &'a Step,
     /// Temperature of every node.
     warm: Vec<f64>,
     /// What is solved for, by elements and after them by springs.
     pub(super) free: Free<'a>,
+    /// Whether springs turn.
+    large: bool,
 }
 
 impl<'a> System<'a> {
     pub(super) fn new(deck: &'a Deck, step: &'a Step, past: &Past) -> Result<Self, LinearError> {
-        let held = deck.held(step, past);
-        // Supports first: equations then bind what is left.
-        let later = deck.later.iter().filter(|l| l.0 <= step.number).map(|l| &l.1);
-        let bound = Bound::new(held.iter().chain(&deck.equations).chain(later))
-            .map_err(|e| LinearError::Contradiction { step: step.name.clone(), line: e.line })?;
-        let sums: Vec<Sum> = (0..3 * deck.nodes.len() as u32).map(|u| bound.of(u)).collect();
+        let sums = sums(deck, step, &deck.constraints(step, past))?;
+        Ok(Self::of(deck, step, past, sums, false))
+    }
+
+    /// From what every unknown is by the free ones, with springs that turn or not.
+    pub(super) fn of(
+        deck: &'a Deck,
+        step: &'a Step,
+        past: &Past,
+        sums: Vec<Sum>,
+        large: bool,
+    ) -> Self {
         let warm = if step.warm.is_empty() { &past.temperatures } else { &step.warm };
-        let elements = (0..deck.cells.len() + deck.springs.len()).map(|e| unknowns(deck, e));
+        let elements = (0..deck.cells.len() + deck.springs.len()).map(|e| unknowns(deck, e, large));
         let free = Free::new(deck, sums, elements, |unknown| unknown / 3);
-        Ok(Self { deck, step, warm: warm.clone(), free })
+        Self { deck, step, warm: warm.clone(), free, large }
     }
 
     /// Temperatures of the nodes of an element.
-    fn warmth(&self, e: usize) -> Warmth {
+    pub(super) fn warmth(&self, e: usize) -> Warmth {
         let of = |all: &[f64]| self.deck.cells[e].nodes.iter().map(|&n| all[n as usize]).collect();
         Warmth { now: of(&self.warm), cold: of(&self.deck.cold) }
     }
 
-    fn initial(&self, e: usize) -> impl Fn(usize) -> Voigt + '_ {
+    pub(super) fn initial(&self, e: usize) -> impl Fn(usize) -> Voigt + '_ {
         move |p| self.deck.stress.get(&(e as u32, p as u32)).copied().unwrap_or(tensor::ZERO)
     }
 
-    fn element(&self, e: usize) -> Element<'a> {
+    pub(super) fn element(&self, e: usize) -> Element<'a> {
         Element::new(self.deck, self.step, e)
     }
 
@@ -303,12 +331,12 @@ impl<'a> System<'a> {
     }
 
     /// Tᵀ K T and Tᵀ (f − K c) of what `fill` says of elements and springs.
-    fn assembled(
+    pub(super) fn assembled(
         &self,
         job: &Job,
         fill: impl Fn(usize, &mut [f64], &mut [f64]) -> Result<(), Folded> + Sync,
     ) -> Result<(BlockMatrix<1>, Vec<f64>), LinearError> {
-        self.free.assembled(job, |e| unknowns(self.deck, e), fill)
+        self.free.assembled(job, |e| unknowns(self.deck, e, self.large), fill)
     }
 
     fn solve(self, past: &mut Past, job: &Job) -> Result<Solved, LinearError> {
@@ -316,11 +344,17 @@ impl<'a> System<'a> {
         let solved = self.finished(self.step.name.clone(), &all)?;
         past.displacements = all;
         past.stresses.clone_from(&solved.stresses);
+        past.large = false;
         Ok(solved)
     }
 
     /// What these displacements of every unknown are to who asked.
     pub(super) fn finished(&self, name: String, all: &[f64]) -> Result<Solved, LinearError> {
+        Ok(self.told(name, all, self.stresses(all)?))
+    }
+
+    /// The same with its stresses.
+    pub(super) fn told(&self, name: String, all: &[f64], stresses: Vec<Vec<Voigt>>) -> Solved {
         let places: Vec<DVec3> =
             all.as_chunks::<3>().0.iter().copied().map(DVec3::from_array).collect();
         let displacement = |n: u32| match self.deck.means.get(&n) {
@@ -328,8 +362,8 @@ impl<'a> System<'a> {
             Some(mean) => mean.iter().map(|&(m, share)| share * places[m as usize]).sum(),
         };
         let displacements = (0..self.deck.labels.len() as u32).map(displacement).collect();
-        let (stresses, unknowns) = (self.stresses(all)?, self.free.count());
-        Ok(Solved { name, displacements, stresses, unknowns, ..Solved::default() })
+        let unknowns = self.free.count();
+        Solved { name, displacements, stresses, unknowns, ..Solved::default() }
     }
 
     /// Displacements of every unknown.
@@ -364,19 +398,17 @@ impl<'a> System<'a> {
         }
     }
 
-    /// The smallest squares of angular frequencies, with what stresses add to the stiffness.
-    fn modes(
+    /// The stiffness with what stresses add to it.
+    fn stiff_under(
         &self,
-        count: usize,
         stresses: &[Vec<Voigt>],
         job: &Job,
-    ) -> Result<Vec<Mode>, LinearError> {
+    ) -> Result<BlockMatrix<1>, LinearError> {
         let (mut stiffness, _) = self.stiffness(job)?;
         if !stresses.is_empty() {
             stiffness.add(1.0, &self.stress_stiffness(stresses, job)?);
         }
-        let (mass, _) = self.mass(job)?;
-        self.smallest(stiffness, &mass, count, job)
+        Ok(stiffness)
     }
 
     /// The smallest factors at which the loads of the step make the structure unstable:
@@ -423,7 +455,7 @@ impl<'a> System<'a> {
     }
 
     /// What acts on elements.
-    fn distributed(&self) -> Result<Loads<'a>, LinearError> {
+    pub(super) fn distributed(&self) -> Result<Loads<'a>, LinearError> {
         let mut loads = Loads { by_cell: HashMap::new() };
         for (&(cell, face), &value) in &self.step.pressures {
             loads.by_cell.entry(cell).or_default().0.push((face, value));
@@ -485,7 +517,7 @@ impl<'a> System<'a> {
     fn stresses(&self, all: &[f64]) -> Result<Vec<Vec<Voigt>>, LinearError> {
         let stress = |e: usize| {
             let own: Vec<f64> =
-                unknowns(self.deck, e).into_iter().map(|u| all[u as usize]).collect();
+                unknowns(self.deck, e, false).into_iter().map(|u| all[u as usize]).collect();
             let found = self.element(e).stresses(&own, &self.warmth(e), self.initial(e));
             found.map_err(|Folded| LinearError::Folded(self.deck.cells[e].label))
         };
@@ -493,16 +525,30 @@ impl<'a> System<'a> {
     }
 }
 
-/// Unknowns of an element or, after the elements, of a spring.
-fn unknowns(deck: &Deck, e: usize) -> Vec<u32> {
-    match deck.cells.get(e) {
-        Some(cell) => cell.nodes.iter().flat_map(|&n| (0..3).map(move |i| 3 * n + i)).collect(),
-        None => deck.springs[e - deck.cells.len()].terms.iter().map(|t| t.0).collect(),
+/// Every unknown by what is free.
+pub(super) fn sums(
+    deck: &Deck,
+    step: &Step,
+    equations: &[Equation],
+) -> Result<Vec<Sum>, LinearError> {
+    // Supports first: equations then bind what is left.
+    let bound = Bound::new(equations)
+        .map_err(|e| LinearError::Contradiction { step: step.name.clone(), line: e.line })?;
+    Ok((0..3 * deck.nodes.len() as u32).map(|u| bound.of(u)).collect())
+}
+
+/// Unknowns of an element or, after the elements, of a spring, which may turn.
+pub(super) fn unknowns(deck: &Deck, e: usize, large: bool) -> Vec<u32> {
+    let all = |nodes: &[u32]| nodes.iter().flat_map(|&n| (0..3).map(move |i| 3 * n + i)).collect();
+    let Some(spring) = e.checked_sub(deck.cells.len()) else { return all(&deck.cells[e].nodes) };
+    match &deck.springs[spring] {
+        Spring { ends: Some(ends), .. } if large => all(ends),
+        Spring { terms, .. } => terms.iter().map(|t| t.0).collect(),
     }
 }
 
 /// Pressures (face, Pa) and pulls of elements.
-struct Loads<'a> {
+pub(super) struct Loads<'a> {
     by_cell: HashMap<u32, (Vec<(u8, f64)>, Vec<&'a Pull>)>,
 }
 
@@ -514,12 +560,32 @@ impl Loads<'_> {
         warmth: &Warmth,
         force: &mut [f64],
     ) -> Result<(), Folded> {
-        let Some((pressures, pulls)) = self.by_cell.get(&(e as u32)) else { return Ok(()) };
+        let (pressures, pulls) = self.of(e);
         pressures.iter().for_each(|&(face, p)| element.pressure(usize::from(face), p, force));
+        self.pull(pulls, element, element, warmth, force)
+    }
+
+    /// Pressures and pulls of an element.
+    pub(super) fn of(&self, e: usize) -> (&[(u8, f64)], &[&Pull]) {
+        match self.by_cell.get(&(e as u32)) {
+            Some((pressures, pulls)) => (pressures.as_slice(), pulls.as_slice()),
+            None => (&[][..], &[][..]),
+        }
+    }
+
+    /// Forces on the mass of an element, where its nodes have gone to.
+    pub(super) fn pull(
+        &self,
+        pulls: &[&Pull],
+        element: &Element<'_>,
+        moved: &Element<'_>,
+        warmth: &Warmth,
+        force: &mut [f64],
+    ) -> Result<(), Folded> {
         let warm = warmth.now.iter().sum::<f64>() / warmth.now.len() as f64;
         let density = element.density(warm);
         for pull in pulls {
-            element.volume_force(|at| density * pull.at(at), force)?;
+            element.volume_force(|at| density * pull.at(moved.place(&at.jets)), force)?;
         }
         Ok(())
     }

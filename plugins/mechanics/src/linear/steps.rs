@@ -11,6 +11,7 @@ use super::{
     matter::all_numbers,
     model::{Course, Damping, Heated, Material, Procedure, Pull, Step},
     read::{Kind, Reader, Surface, plain},
+    shape::Shape,
     thin::Thin,
     tie::{self, Face},
     warm::is_temperature,
@@ -47,6 +48,8 @@ pub(super) struct State {
     pub(super) heating: BTreeMap<Heated, Given<[f64; 2]>>,
     materials: BTreeMap<u32, u32>,
     pub(super) step: u32,
+    /// Whether displacements are large: from a step on until one says otherwise.
+    large: bool,
     open: Option<Open>,
     /// When the steps before it ended.
     time: f64,
@@ -164,6 +167,7 @@ impl Reader {
             state.loads(&factor)?
         };
         (step.procedure, step.damping) = (procedure, damping);
+        step.large = state.large && procedure == Procedure::Static;
         if let Procedure::Heat { .. } | Procedure::Modes { heat: true, .. } = procedure {
             for (&node, given) in &state.temperatures {
                 step.temperatures.insert(node, given.value * factor(&given.amplitude)?);
@@ -272,6 +276,13 @@ impl Reader {
         if let Procedure::Motion { .. } | Procedure::Harmonic { .. } = procedure {
             return self.vibrates(state, line);
         }
+        if state.large && procedure == Procedure::Static {
+            return self.turns();
+        }
+        let was_large = self.deck.steps.last().is_some_and(|s| s.large);
+        if was_large && matches!(procedure, Procedure::Buckling { .. }) {
+            return Err(Fault::at(line, "*BUCKLE after large displacements is not computed"));
+        }
         if let Procedure::Modes { heat: false, .. } = procedure {
             lacks(|m| m.density.is_some(), "*DENSITY")?;
         }
@@ -303,6 +314,24 @@ impl Reader {
             return Err(Fault::at(line, "heat through a *TIE is not computed"));
         }
         Ok(())
+    }
+
+    /// Everything is known where displacements are large.
+    fn turns(&self) -> Result<(), Fault> {
+        let why = "where displacements are large (NLGEOM)";
+        let is_known = |kind: Kind| match kind {
+            Kind::Solid(shape) => shape != Shape::Hex8Bubbles,
+            Kind::Flat(_) | Kind::Link(_) => true,
+            Kind::Thin(_) => false,
+        };
+        let unknown = self.raw.iter().filter(|r| !is_known(r.kind)).map(|r| {
+            let what = "C3D8I, beams and shells are not computed";
+            Fault::at(r.line, format!("element {}: {what} {why}", r.label))
+        });
+        let bound = self
+            .small
+            .map(|(line, what)| Fault::at(line, format!("*{what} is not computed {why}")));
+        Fault::all(unknown.take(1).chain(bound).collect())
     }
 
     /// A step of motion or vibration follows one of frequencies, and nothing warms in it.
@@ -402,7 +431,7 @@ impl Reader {
 
     /// Forces. What is given twice in a step adds up, as in CalculiX.
     fn cload(&mut self, card: &Card<'_>, state: &mut State) -> Result<(), Fault> {
-        card.only(&["OP", "AMPLITUDE", "LOAD CASE"])?;
+        card.only(&["OP", "AMPLITUDE", "TIME DELAY", "LOAD CASE"])?;
         clear(card, state.step, &mut state.forces, |_| true)?;
         clear(card, state.step, &mut state.early, |_| true)?;
         let forces = match card.get("LOAD CASE") {
@@ -412,7 +441,7 @@ impl Reader {
                 return Err(card.fault("LOAD CASE is 1, or 2 in *STEADY STATE DYNAMICS"));
             }
         };
-        let amplitude = super::mesh::name_of(card, "AMPLITUDE")?;
+        let amplitude = self.delayed(card)?;
         let around = self.around_nodes();
         for row in card.rows() {
             let [target, direction, value] = row.exactly("node or set, component, force")?;
@@ -434,6 +463,23 @@ impl Reader {
             }
         }
         Ok(())
+    }
+
+    /// The amplitude that a card names, which begins later where it says so.
+    fn delayed(&mut self, card: &Card<'_>) -> Result<Option<String>, Fault> {
+        let (Some(name), Some(delay)) =
+            (super::mesh::name_of(card, "AMPLITUDE")?, card.get("TIME DELAY"))
+        else {
+            return super::mesh::name_of(card, "AMPLITUDE");
+        };
+        let wrong = || card.fault(format!("TIME DELAY={} is no time", quote(delay)));
+        let by: f64 = delay.parse().map_err(|_| wrong())?;
+        let mut later = self.amplitude_of(&name, card.line)?.clone();
+        later.points.iter_mut().for_each(|p| p.0 += by);
+        later.name = format!("{name} {by} s later");
+        let name = later.name.clone();
+        self.amplitudes.insert(name.clone(), later);
+        Ok(Some(name))
     }
 
     pub(super) fn around_nodes(&self) -> BTreeSet<u32> {
@@ -714,11 +760,10 @@ fn begin(card: &Card<'_>, state: &mut State) -> Result<(), Fault> {
         procedure: None,
         damping: Damping::None,
     });
-    card.only(&["NAME", "INC", "AMPLITUDE", "NLGEOM", "PERTURBATION"])?;
-    if card.word("NLGEOM").is_some_and(|v| v != "NO") {
-        return Err(card.fault("*STEP, NLGEOM: large displacements are not computed"));
+    if let Some(word) = card.word("NLGEOM") {
+        state.large = word != "NO";
     }
-    Ok(())
+    card.only(&["NAME", "INC", "AMPLITUDE", "NLGEOM", "PERTURBATION"])
 }
 
 /// What a step computes, and how.
