@@ -19,7 +19,7 @@ use crate::{
 };
 
 /// Newton's steps.
-const STEPS: usize = 16;
+const STEPS: usize = 30;
 /// Change of a displacement that counts as none, over the largest.
 const SETTLED: f64 = 1e-9;
 /// ‖f − K u‖ / ‖f‖ of every change.
@@ -119,6 +119,12 @@ impl<'a> Way<'a> {
         let mut equations = self.deck.constraints(self.step, self.past);
         for (equation, said) in equations.iter_mut().zip(&self.said) {
             equation.value = share * equation.value + (1.0 - share) * said;
+        }
+        let held = self.step.held.len() + self.step.kept.len();
+        for curved in &self.deck.curved {
+            let about = curved.equations(&self.deck.nodes, |u| all[u as usize]);
+            let own = equations.iter_mut().skip(held + curved.first);
+            own.zip(about.into_iter().flatten()).for_each(|(old, new)| *old = new);
         }
         let mut sums = sums(self.deck, self.step, &equations)?;
         for (sum, now) in sums.iter_mut().zip(all) {

@@ -7,6 +7,7 @@ use glam::DVec3;
 
 use super::{
     constraint::Equation,
+    curve::{Curve, Curved, terms},
     matter::all_numbers,
     mesh::name_of,
     model::Spring,
@@ -50,38 +51,11 @@ impl Link {
     }
 }
 
-/// Factors of the displacements of places whose sum is their mean rotation about an axis: with r
-/// the distance of each from the axis through their middle, (1/n) Σ (a × r)·(u − ū)/|r|² (Dhondt,
-/// *The Finite Element Method for Three-Dimensional Thermomechanical Applications*, sec. 3.6).
-/// Places on the axis say nothing; none where all lie on it.
-pub(super) fn mean_rotation(places: &[DVec3], axis: DVec3) -> Option<Vec<DVec3>> {
-    let middle = places.iter().sum::<DVec3>() / places.len() as f64;
-    let arms: Vec<DVec3> =
-        places.iter().map(|&p| (p - middle).reject_from_normalized(axis)).collect();
-    let reach = arms.iter().map(|r| r.length()).fold(0.0, f64::max);
-    let beside = |r: &&DVec3| r.length() > 1e-6 * reach;
-    let count = arms.iter().filter(beside).count() as f64;
-    if reach == 0.0 || count < 1.0 {
-        return None;
-    }
-    let turn = |r: &DVec3| axis.cross(*r) / (count * r.length_squared());
-    let own: Vec<DVec3> =
-        arms.iter().map(|r| if beside(&r) { turn(r) } else { DVec3::ZERO }).collect();
-    let mean = own.iter().sum::<DVec3>() / places.len() as f64;
-    Some(own.into_iter().map(|c| c - mean).collect())
-}
-
-/// Components of nodes with their factors.
-pub(super) fn terms(nodes: &[u32], factors: &[DVec3]) -> Vec<(u32, f64)> {
-    let three = |(&n, f): (&u32, &DVec3)| [(3 * n, f.x), (3 * n + 1, f.y), (3 * n + 2, f.z)];
-    nodes.iter().zip(factors).flat_map(three).filter(|t| t.1 != 0.0).collect()
-}
-
 impl Reader {
     pub(super) fn linked(&mut self, card: &Card<'_>) -> Result<(), Fault> {
         match plain(card).as_str() {
             "SPRING" => self.spring(card),
-            "MPC" => self.mean_rotations(card),
+            "MPC" => self.multiple(card),
             "RIGIDBODY" => self.rigid_body(card),
             "DISTRIBUTINGCOUPLING" => self.coupling(card),
             _ => Ok(()),
@@ -125,7 +99,7 @@ impl Reader {
             (Link::Between, &[a, b]) => {
                 let along = self.deck.nodes[b as usize] - self.deck.nodes[a as usize];
                 let along = along.try_normalize()?;
-                Some(terms(nodes, &[-along, along]))
+                Some(terms(&[(nodes[0], -along), (nodes[1], along)]))
             }
             (Link::Ground, &[a]) => Some(signed(a, *by.first()?, 1.0).collect()),
             (Link::Components, &[a, b]) => {
@@ -136,18 +110,18 @@ impl Reader {
         }
     }
 
-    /// Every `MEANROT`: nodes, each for its three components, and the node whose place is the axis
-    /// and whose first component is the angle.
-    fn mean_rotations(&mut self, card: &Card<'_>) -> Result<(), Fault> {
+    /// `MEANROT`: nodes, each for its three components, and the node whose place is the axis and
+    /// whose first component is the angle. `PLANE` and `STRAIGHT`: nodes that stay in one.
+    fn multiple(&mut self, card: &Card<'_>) -> Result<(), Fault> {
         card.only(&[])?;
         let mut rows = card.rows().peekable();
         while let Some(row) = rows.next() {
             let mut words = row.fields().filter(|w| !w.is_empty());
             let kind = words.next().unwrap_or_default().to_ascii_uppercase();
-            if kind != "MEANROT" {
-                return Err(row.fault(format!("*MPC: {}: MEANROT is supported", quote(&kind))));
+            let mut nodes = Vec::new();
+            for word in words {
+                nodes.extend(self.some_nodes(word, row)?);
             }
-            let mut nodes: Vec<u32> = words.map(|w| self.node(w, row)).collect::<Result<_, _>>()?;
             while let Some(next) =
                 rows.next_if(|r| !r.text.starts_with(|c: char| c.is_ascii_alphabetic()))
             {
@@ -155,23 +129,44 @@ impl Reader {
                     nodes.push(self.node(word, next)?);
                 }
             }
-            let pilot = nodes.pop().ok_or_else(|| row.fault("MEANROT needs nodes"))?;
-            nodes.dedup();
-            let axis = self.deck.nodes[pilot as usize].try_normalize();
-            let axis = axis.ok_or_else(|| row.fault("the axis of MEANROT has no length"))?;
-            self.small.get_or_insert((row.line, "MPC"));
-            let places: Vec<DVec3> = nodes.iter().map(|&n| self.deck.nodes[n as usize]).collect();
-            let factors = mean_rotation(&places, axis)
-                .ok_or_else(|| row.fault("the nodes of MEANROT lie on one axis"))?;
-            // The pilot is an angle: its unit is not that of lengths.
-            let mut all = terms(&nodes, &factors);
-            all.push((3 * pilot, -1.0 / self.units.length()));
-            self.deck.equations.push(Equation { terms: all, value: 0.0, line: row.line });
+            let curve = match kind.as_str() {
+                "MEANROT" => {
+                    let pilot = nodes.pop().ok_or_else(|| row.fault("MEANROT needs nodes"))?;
+                    nodes.dedup();
+                    let axis = self.deck.nodes[pilot as usize].try_normalize();
+                    let axis =
+                        axis.ok_or_else(|| row.fault("the axis of MEANROT has no length"))?;
+                    // The pilot is an angle: its unit is not that of lengths.
+                    Curve::Turn { nodes, axis, angle: 3 * pilot, unit: self.units.length() }
+                }
+                "PLANE" => Curve::Plane(nodes),
+                "STRAIGHT" => Curve::Straight(nodes),
+                other => {
+                    let other = quote(other);
+                    return Err(row.fault(format!(
+                        "*MPC: {other}: MEANROT, PLANE and STRAIGHT are supported"
+                    )));
+                }
+            };
+            if !self.bound(curve, row.line) {
+                let why = "lie on one axis, on one line, or are one";
+                return Err(row.fault(format!("*MPC: the nodes of {kind} {why}")));
+            }
         }
         Ok(())
     }
 
-    /// u = u₀ + θ × (x − x₀) of every node of the set.
+    /// Adds a constraint that is another where displacements are large, unless its nodes are too
+    /// few to say anything.
+    pub(super) fn bound(&mut self, curve: Curve, line: u32) -> bool {
+        let curved = Curved { curve, first: self.deck.equations.len(), line };
+        let Some(equations) = curved.equations(&self.deck.nodes, |_| 0.0) else { return false };
+        self.deck.equations.extend(equations);
+        self.deck.curved.push(curved);
+        true
+    }
+
+    /// Every node of the set moves and turns with the reference.
     fn rigid_body(&mut self, card: &Card<'_>) -> Result<(), Fault> {
         card.only(&["NSET", "ELSET", "REF NODE", "ROT NODE"])?;
         if !card.rows().collect::<Vec<_>>().is_empty() {
@@ -194,25 +189,10 @@ impl Reader {
                 turning
             }
         };
-        self.small.get_or_insert((card.line, "RIGID BODY"));
-        let origin = self.deck.nodes[reference as usize];
         // Components of a node that turns are angles.
         let unit = if self.turning.contains_key(&reference) { 1.0 } else { self.units.length() };
-        for node in nodes.into_iter().filter(|&n| n != reference && n != turning) {
-            let arm = self.deck.nodes[node as usize] - origin;
-            for i in 0..3_u32 {
-                let along = DVec3::AXES[i as usize];
-                let mut terms = vec![(3 * node + i, 1.0), (3 * reference + i, -1.0)];
-                // (θ × r)·e = θ·(r × e).
-                let turned = arm.cross(along) / unit;
-                for (j, factor) in turned.to_array().into_iter().enumerate() {
-                    if factor != 0.0 {
-                        terms.push((3 * turning + j as u32, -factor));
-                    }
-                }
-                self.deck.equations.push(Equation { terms, value: 0.0, line: card.line });
-            }
-        }
+        let nodes = nodes.into_iter().filter(|&n| n != reference && n != turning).collect();
+        self.bound(Curve::Body { reference, turning, unit, nodes }, card.line);
         Ok(())
     }
 

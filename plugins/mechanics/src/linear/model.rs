@@ -6,6 +6,7 @@ use glam::DVec3;
 
 use super::{
     constraint::Equation,
+    curve::Curved,
     law::{Elastic, Expansion, Table},
     shape::{Point, Shape},
 };
@@ -27,6 +28,8 @@ pub struct Deck {
     pub(super) springs: Vec<Spring>,
     /// What holds in every step: equations, ties, thickened elements.
     pub(super) equations: Vec<Equation>,
+    /// Those of the equations that are others where displacements are large.
+    pub(super) curved: Vec<Curved>,
     /// Nodes that thicken flat elements, and the node that each has its temperature from.
     pub(super) twins: HashMap<u32, u32>,
     /// Nodes whose displacement is given as the mean of others.

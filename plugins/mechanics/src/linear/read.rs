@@ -184,8 +184,6 @@ pub(super) struct Reader {
     /// W/(m²·K⁴).
     pub(super) boltzmann: Option<f64>,
     pub(super) tied: bool,
-    /// What is known for small displacements alone: its line and card.
-    pub(super) small: Option<(u32, &'static str)>,
     pub(super) in_material: bool,
     faults: Vec<Fault>,
 }
@@ -209,7 +207,6 @@ impl Reader {
             rings: HashMap::new(),
             boltzmann: None,
             tied: false,
-            small: None,
             in_material: false,
             faults: Vec::new(),
         }

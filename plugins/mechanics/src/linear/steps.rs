@@ -316,22 +316,23 @@ impl Reader {
         Ok(())
     }
 
-    /// Everything is known where displacements are large.
+    /// Every element is known where displacements are large.
     fn turns(&self) -> Result<(), Fault> {
-        let why = "where displacements are large (NLGEOM)";
-        let is_known = |kind: Kind| match kind {
-            Kind::Solid(shape) => shape != Shape::Hex8Bubbles,
-            Kind::Flat(_) | Kind::Link(_) => true,
-            Kind::Thin(_) => false,
+        let has_bubbles = |kind: Kind| match kind {
+            Kind::Solid(shape)
+            | Kind::Thin(Thin::Beam { shape, .. } | Thin::Shell { shape, .. }) => {
+                shape == Shape::Hex8Bubbles
+            }
+            Kind::Flat(_) | Kind::Link(_) => false,
         };
-        let unknown = self.raw.iter().filter(|r| !is_known(r.kind)).map(|r| {
-            let what = "C3D8I, beams and shells are not computed";
-            Fault::at(r.line, format!("element {}: {what} {why}", r.label))
-        });
-        let bound = self
-            .small
-            .map(|(line, what)| Fault::at(line, format!("*{what} is not computed {why}")));
-        Fault::all(unknown.take(1).chain(bound).collect())
+        match self.raw.iter().find(|r| has_bubbles(r.kind)) {
+            None => Ok(()),
+            Some(raw) => {
+                let why =
+                    "C3D8I, B31 and S4 are not computed where displacements are large (NLGEOM)";
+                Err(Fault::at(raw.line, format!("element {}: {why}", raw.label)))
+            }
+        }
     }
 
     /// A step of motion or vibration follows one of frequencies, and nothing warms in it.
