@@ -112,6 +112,44 @@ fn what_stands_on_a_support_that_moves_is_carried_with_it() {
     near(far, 0.5 * (2.0 - (2.0 * pace).sin() / pace), 1e-3);
 }
 
+/// The bar that swings as its modes do, by the equations themselves: without dissipation the mean of
+/// its end over the time of a wave is where it is held at rest. And damped by its mass alone, thrown
+/// as one body, it slows down by e^(−αt).
+#[test]
+fn a_bar_swings_in_time_as_its_modes_do() {
+    let modulus = E * 0.7 / (1.3 * 0.4);
+    let back = 2.0 * (3.0 / modulus).sqrt();
+    let held = bar(1.0, 8, 0.3, "C3D20") + "*BOUNDARY\nLOW,1\nALL,2,3\n";
+    let load = "*DLOAD\n8,P2,-1.\n*END STEP\n";
+    let moved = |way: &str| {
+        let deck = format!("{held}*STEP\n*DYNAMIC,{way}\n{:?},{back:?}\n{load}", back / 80.0);
+        *solve(&deck)[0].displacements.last().unwrap()
+    };
+    // Of all modes together the end goes to 2 L/M and no farther; a kink rounded by increments.
+    near(moved("DIRECT,ALPHA=0.").x * modulus, 2.0, 0.05);
+    let modes = solve(&format!(
+        "{held}*STEP\n*FREQUENCY\n12\n*END STEP\n*STEP\n*MODAL DYNAMIC,DIRECT=NO\n.1,{back:?}\n{load}"
+    ));
+    near(moved("ALPHA=0.").x * modulus, modes[1].displacements.last().unwrap().x * modulus, 0.06);
+    let thrown = bar(1.0, 1, 1.0, "C3D20")
+        .replace("*DENSITY", "*DAMPING,ALPHA=2.,BETA=0.\n*DENSITY")
+        + "*BOUNDARY\nALL,2,3\n*STEP\n*DYNAMIC,DIRECT,ALPHA=0.\n.001,1.\n*DLOAD\nALL,GRAV,1.,1.,0.,0.\n*END STEP\n";
+    // ẍ + 2 ẋ = 1 from rest.
+    near(solve(&thrown)[0].displacements[0].x, 0.5 - 0.25 * (1.0 - (-2.0f64).exp()), 1e-5);
+}
+
+/// A pair of blocks that an equation binds goes on alone once the equation is removed.
+#[test]
+fn equations_hold_until_they_are_removed() {
+    let deck = bar(1.0, 1, 1.0, "C3D20")
+        + "*EQUATION\n2\n21,1,1.,22,1,-1.\n*BOUNDARY\nLOW,1,3\nALL,2,3\n*STEP\n*STATIC\n*CLOAD\n21,1,1.\n*END STEP\n\
+           *STEP\n*STATIC\n*EQUATION,REMOVE\n21,1\n*END STEP\n";
+    let solved = solve(&deck);
+    let apart = |k: usize| solved[k].displacements[12].x - solved[k].displacements[13].x;
+    near(apart(0), 0.0, 1e-12);
+    assert!(apart(1) > 1e-3, "{}", apart(1));
+}
+
 /// One element between planes of symmetry, with sides HIGH at x = 1.
 fn cube(steps: &str) -> String {
     bar(1.0, 1, 1.0, "C3D20").replace("*DENSITY", "*EXPANSION\n1e-3\n*DENSITY")

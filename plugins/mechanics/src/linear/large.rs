@@ -4,6 +4,8 @@
 //! forces, warmth and supports, is taken away by and by; each part of it is settled by Newton's
 //! method, and halved where that fails.
 
+use std::collections::BTreeMap;
+
 use glam::DVec3;
 use intrados_stage::Job;
 
@@ -72,10 +74,11 @@ pub(super) fn tangent<'a>(
     past: &Past,
     job: &Job,
 ) -> Result<(System<'a>, BlockMatrix<1>), LinearError> {
-    let system =
-        System::of(deck, step, past, sums(deck, step, &deck.constraints(step, past))?, true);
-    let loads = system.distributed()?;
     let all = started(deck, past);
+    let mut equations = deck.constraints(step, past);
+    bend(deck, step, &mut equations, &all);
+    let system = System::of(deck, step, past, sums(deck, step, &equations)?, true);
+    let loads = system.distributed()?;
     let (matrix, _) = system
         .assembled(job, |e, k, f| unbalanced(&system, &loads, e, &own(deck, e, &all), k, f))?;
     Ok((system, matrix))
@@ -120,17 +123,7 @@ impl<'a> Way<'a> {
         for (equation, said) in equations.iter_mut().zip(&self.said) {
             equation.value = share * equation.value + (1.0 - share) * said;
         }
-        let held = self.step.held.len() + self.step.kept.len();
-        for curved in &self.deck.curved {
-            let about = curved.equations(&self.deck.nodes, |u| all[u as usize]);
-            let own = equations.iter_mut().skip(held + curved.first);
-            own.zip(about.into_iter().flatten()).for_each(|(old, new)| *old = new);
-        }
-        let mut sums = sums(self.deck, self.step, &equations)?;
-        for (sum, now) in sums.iter_mut().zip(all) {
-            sum.constant += sum.terms.iter().map(|&(u, f)| f * all[u as usize]).sum::<f64>() - now;
-        }
-        Ok(System::of(self.deck, self.step, self.past, sums, true))
+        about(self.deck, self.step, self.past, equations, all)
     }
 
     /// Displacements at which that share of the step is in balance; none where they do not settle.
@@ -140,54 +133,94 @@ impl<'a> Way<'a> {
         from: &[f64],
         job: &Job,
     ) -> Result<Option<Vec<f64>>, LinearError> {
-        let mut all = from.to_vec();
-        for _ in 0..STEPS {
-            let system = self.system(share, &all)?;
-            let assembled = system.assembled(job, |e, k, f| {
-                unbalanced(&system, &self.loads, e, &own(self.deck, e, &all), k, f)?;
-                f.iter_mut().zip(&self.open[e]).for_each(|(f, open)| *f -= (1.0 - share) * open);
-                Ok(())
-            });
-            let (matrix, mut rhs) = match assembled {
-                Err(LinearError::Folded(_)) => return Ok(None),
-                other => other?,
-            };
-            let forces = self.step.forces.iter().map(|(&at, force)| (at, share * force)).collect();
-            system.nodal(&forces, &mut rhs)?;
-            let none = Constraints::new(rhs.len());
-            let (free, negative) = if rhs.is_empty() {
-                (Vec::new(), 0)
-            } else {
-                match direct(&matrix, &rhs, &none, Method::Direct, TOLERANCE, job) {
-                    Ok(found) => (found.x, found.negative_eigenvalues),
-                    Err(
-                        SolveError::Indefinite { .. }
-                        | SolveError::NoStiffness { .. }
-                        | SolveError::Singular { .. }
-                        | SolveError::NotFinite { .. }
-                        | SolveError::NotConverged { .. },
-                    ) => return Ok(None),
-                    Err(other) => return Err(other.into()),
-                }
-            };
-            let change = system.free.expanded(&free);
-            all.iter_mut().zip(&change).for_each(|(u, d)| *u += d);
-            let largest = |all: &[f64]| all.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
-            let moved = largest(&change);
-            if !moved.is_finite() {
-                return Ok(None);
+        let forces = self.step.forces.iter().map(|(&at, force)| (at, share * force)).collect();
+        let fill = |system: &System<'_>, all: &[f64], e: usize, k: &mut [f64], f: &mut [f64]| {
+            unbalanced(system, &self.loads, e, &own(self.deck, e, all), k, f)?;
+            f.iter_mut().zip(&self.open[e]).for_each(|(f, open)| *f -= (1.0 - share) * open);
+            Ok::<_, Folded>(())
+        };
+        settled(from, |all| self.system(share, all), fill, &forces, job)
+    }
+}
+
+/// Newton's method: displacements at which what `fill` says of elements is in balance with forces at
+/// nodes; none where they do not settle. `about` gives the unknowns with what constraints ask for
+/// beyond displacements.
+pub(super) fn settled<'a>(
+    from: &[f64],
+    about: impl Fn(&[f64]) -> Result<System<'a>, LinearError>,
+    fill: impl Fn(&System<'a>, &[f64], usize, &mut [f64], &mut [f64]) -> Result<(), Folded> + Sync,
+    forces: &BTreeMap<(u32, u8), f64>,
+    job: &Job,
+) -> Result<Option<Vec<f64>>, LinearError> {
+    let mut all = from.to_vec();
+    for _ in 0..STEPS {
+        let system = about(&all)?;
+        let (matrix, mut rhs) = match system.assembled(job, |e, k, f| fill(&system, &all, e, k, f))
+        {
+            Err(LinearError::Folded(_)) => return Ok(None),
+            other => other?,
+        };
+        system.nodal(forces, &mut rhs)?;
+        let none = Constraints::new(rhs.len());
+        let (free, negative) = if rhs.is_empty() {
+            (Vec::new(), 0)
+        } else {
+            match direct(&matrix, &rhs, &none, Method::Direct, TOLERANCE, job) {
+                Ok(found) => (found.x, found.negative_eigenvalues),
+                Err(
+                    SolveError::Indefinite { .. }
+                    | SolveError::NoStiffness { .. }
+                    | SolveError::Singular { .. }
+                    | SolveError::NotFinite { .. }
+                    | SolveError::NotConverged { .. },
+                ) => return Ok(None),
+                Err(other) => return Err(other.into()),
             }
-            if moved <= SETTLED * largest(&all) {
-                return Ok((negative == 0).then_some(all));
-            }
+        };
+        let change = system.free.expanded(&free);
+        all.iter_mut().zip(&change).for_each(|(u, d)| *u += d);
+        let largest = |all: &[f64]| all.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
+        let moved = largest(&change);
+        if !moved.is_finite() {
+            return Ok(None);
         }
-        Ok(None)
+        if moved <= SETTLED * largest(&all) {
+            return Ok((negative == 0).then_some(all));
+        }
+    }
+    Ok(None)
+}
+
+/// The unknowns of a step with what its constraints ask for beyond displacements.
+pub(super) fn about<'a>(
+    deck: &'a Deck,
+    step: &'a Step,
+    past: &Past,
+    mut equations: Vec<Equation>,
+    all: &[f64],
+) -> Result<System<'a>, LinearError> {
+    bend(deck, step, &mut equations, all);
+    let mut sums = sums(deck, step, &equations)?;
+    for (sum, now) in sums.iter_mut().zip(all) {
+        sum.constant += sum.terms.iter().map(|&(u, f)| f * all[u as usize]).sum::<f64>() - now;
+    }
+    Ok(System::of(deck, step, past, sums, step.large))
+}
+
+/// Makes the constraints of a step what they are about displacements.
+fn bend(deck: &Deck, step: &Step, equations: &mut [Equation], all: &[f64]) {
+    let held = step.held.len() + step.kept.len();
+    for curved in &deck.curved {
+        let about = curved.equations(&deck.nodes, |u| all[u as usize]);
+        let own = equations.iter_mut().skip(held + curved.first);
+        own.zip(about.into_iter().flatten()).for_each(|(old, new)| *old = new);
     }
 }
 
 /// Tangent of an element or a spring and what is out of balance in it, at displacements of its own
 /// unknowns.
-fn unbalanced(
+pub(super) fn unbalanced(
     system: &System<'_>,
     loads: &Loads<'_>,
     e: usize,
@@ -246,7 +279,10 @@ fn turned(
     Ok(())
 }
 
-fn true_stresses(system: &System<'_>, all: &[f64]) -> Result<Vec<Vec<Voigt>>, LinearError> {
+pub(super) fn true_stresses(
+    system: &System<'_>,
+    all: &[f64],
+) -> Result<Vec<Vec<Voigt>>, LinearError> {
     let stress = |e: usize| {
         let element = system.element(e);
         let moved = element.moved(&own(system.deck, e, all));
@@ -257,7 +293,7 @@ fn true_stresses(system: &System<'_>, all: &[f64]) -> Result<Vec<Vec<Voigt>>, Li
 }
 
 /// Displacements of every unknown that the steps before have left.
-fn started(deck: &Deck, past: &Past) -> Vec<f64> {
+pub(super) fn started(deck: &Deck, past: &Past) -> Vec<f64> {
     let mut all = past.displacements.clone();
     all.resize(3 * deck.nodes.len(), 0.0);
     all

@@ -33,7 +33,7 @@ impl Reader {
                 self.in_material = true;
                 Ok(())
             }
-            "ELASTIC" | "DENSITY" | "EXPANSION" | "CONDUCTIVITY" | "SPECIFICHEAT" => {
+            "ELASTIC" | "DENSITY" | "EXPANSION" | "CONDUCTIVITY" | "SPECIFICHEAT" | "DAMPING" => {
                 if !in_material {
                     return Err(card.fault(format!("*{} must stand under a *MATERIAL", card.name)));
                 }
@@ -81,6 +81,15 @@ impl Reader {
                     return Err(card.fault(format!("conductivity must be above 0, not {k}")));
                 }
                 material.conductivity = Some(table);
+            }
+            "DAMPING" => {
+                card.only(&["ALPHA", "BETA"])?;
+                for (to, name) in material.damping.iter_mut().zip(["ALPHA", "BETA"]) {
+                    let Some(word) = card.get(name) else { continue };
+                    let found = word.parse().ok().filter(|d: &f64| *d >= 0.0);
+                    let wrong = || card.fault(format!("{name} is a number that is not below 0"));
+                    *to = found.ok_or_else(wrong)?;
+                }
             }
             _ => {
                 card.only(&[])?;

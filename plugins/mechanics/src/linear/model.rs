@@ -11,6 +11,7 @@ use super::{
     shape::{Point, Shape},
 };
 use crate::{
+    model::interpolate,
     tensor::{self, Frame, Voigt},
     write::Grid,
 };
@@ -28,6 +29,8 @@ pub struct Deck {
     pub(super) springs: Vec<Spring>,
     /// What holds in every step: equations, ties, thickened elements.
     pub(super) equations: Vec<Equation>,
+    /// Steps from which on equations do not hold any more.
+    pub(super) until: HashMap<usize, u32>,
     /// Those of the equations that are others where displacements are large.
     pub(super) curved: Vec<Curved>,
     /// Nodes that thicken flat elements, and the node that each has its temperature from.
@@ -98,6 +101,8 @@ pub(super) struct Material {
     pub(super) conductivity: Option<Table<3>>,
     /// J/(kg·K).
     pub(super) specific_heat: Option<Table<1>>,
+    /// Rayleigh's: so many times the mass, 1/s, and so many times the stiffness, s.
+    pub(super) damping: [f64; 2],
 }
 
 /// The axes of a material.
@@ -182,6 +187,9 @@ pub(super) enum Procedure {
     /// Motion over time by the modes of the last step of them: in increments of so many seconds, or
     /// from corner to corner of what acts.
     Motion { increment: Option<f64>, duration: f64 },
+    /// Motion over time by the equations themselves, in increments of so many seconds or shorter
+    /// ones, with Hilber's, Hughes' and Taylor's α.
+    Dynamic { increment: f64, fixed: bool, duration: f64, alpha: f64 },
     /// What stays of vibrations at frequencies between these, Hz: so many of them between two
     /// modes, the nearer to these the larger the bias.
     Harmonic { range: [f64; 2], points: u32, bias: f64 },
@@ -257,6 +265,26 @@ pub(super) struct Step {
     pub(super) heating: BTreeMap<Heated, [f64; 2]>,
     /// Elements that are made of another material than their own.
     pub(super) materials: BTreeMap<u32, u32>,
+}
+
+impl Step {
+    /// The step at a time of it: everything times what its course is then.
+    pub(super) fn at(&self, time: f64) -> Self {
+        let mut now = Self { courses: Vec::new(), ..self.clone() };
+        for course in &self.courses {
+            let factor = interpolate(&course.points, time).unwrap_or(1.0);
+            let add = |to: &mut BTreeMap<(u32, u8), f64>, from: &BTreeMap<(u32, u8), f64>| {
+                for (&key, value) in from {
+                    *to.entry(key).or_default() += factor * value;
+                }
+            };
+            add(&mut now.held, &course.base.held);
+            add(&mut now.forces, &course.loads.forces);
+            add(&mut now.pressures, &course.loads.pressures);
+            now.pulls.extend(course.loads.pulls.iter().map(|&(e, pull)| (e, pull.times(factor))));
+        }
+        now
+    }
 }
 
 impl Deck {

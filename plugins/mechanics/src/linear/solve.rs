@@ -7,6 +7,7 @@ use intrados_stage::{Cancelled, Job};
 
 use super::{
     constraint::{Bound, Equation, Sum},
+    dynamic,
     element::{Element, Folded, Warmth},
     free::Free,
     heat, large,
@@ -134,6 +135,8 @@ const TOLERANCE: f64 = 1e-6;
 pub(super) struct Past {
     /// Of every unknown; empty before the first step.
     pub(super) displacements: Vec<f64>,
+    /// The same by the second; empty after a step that is none of motion.
+    pub(super) speeds: Vec<f64>,
     pub(super) stresses: Vec<Vec<Voigt>>,
     /// Whether they are of equilibrium where everything has gone to.
     pub(super) large: bool,
@@ -161,6 +164,9 @@ impl Deck {
         let mut solved = Vec::new();
         for (i, step) in self.steps.iter().enumerate() {
             job.step(i, self.steps.len())?;
+            if !matches!(step.procedure, Procedure::Dynamic { .. }) {
+                past.speeds.clear();
+            }
             let part = job.part(i as f64 / share, (i + 1) as f64 / share);
             match step.procedure {
                 Procedure::Motion { .. } | Procedure::Harmonic { .. } => {
@@ -200,6 +206,7 @@ impl Deck {
                 let time = (!steady).then_some([first, duration]);
                 heat::solve(self, step, time, &mut past.temperatures, job)
             }
+            Procedure::Dynamic { .. } => dynamic::solve(self, step, past, job),
             _ if step.large => large::solve(self, step, past, job),
             _ => System::new(self, step, past)?.solve(past, job),
         }
@@ -219,7 +226,13 @@ impl Deck {
             equation((node, component), terms.iter().filter_map(place).sum())
         });
         let later = self.later.iter().filter(|l| l.0 <= step.number).map(|l| &l.1);
-        held.chain(kept).chain(self.equations.iter().chain(later).cloned()).collect()
+        let own = self.equations.iter().enumerate().map(|(i, equation)| {
+            // What holds no more says nothing.
+            let is_over = self.until.get(&i).is_some_and(|until| *until <= step.number);
+            let nothing = || Equation { terms: Vec::new(), value: 0.0, line: equation.line };
+            if is_over { nothing() } else { equation.clone() }
+        });
+        held.chain(kept).chain(own).chain(later.cloned()).collect()
     }
 }
 

@@ -115,7 +115,7 @@ impl Reader {
     /// Everything that has an order.
     pub(super) fn history(&mut self, card: &Card<'_>, state: &mut State) -> Result<(), Fault> {
         let name = plain(card);
-        const WITHIN: &str = "STATIC FREQUENCY BUCKLE HEATTRANSFER MODALDYNAMIC \
+        const WITHIN: &str = "STATIC DYNAMIC FREQUENCY BUCKLE HEATTRANSFER MODALDYNAMIC \
             STEADYSTATEDYNAMICS MODALDAMPING ENDSTEP CLOAD DLOAD DSLOAD TEMPERATURE CFLUX DFLUX \
             FILM RADIATE CHANGESOLIDSECTION";
         if WITHIN.split_ascii_whitespace().any(|w| w == name) && state.open.is_none() {
@@ -124,6 +124,7 @@ impl Reader {
         match name.as_str() {
             "STEP" => begin(card, state),
             "STATIC"
+            | "DYNAMIC"
             | "FREQUENCY"
             | "BUCKLE"
             | "HEATTRANSFER"
@@ -131,6 +132,7 @@ impl Reader {
             | "STEADYSTATEDYNAMICS" => procedure(card, &name, state),
             "MODALDAMPING" => damping(card, state),
             "ENDSTEP" => self.close(state),
+            "EQUATION" => self.end_equations(card, state),
             "BOUNDARY" => self.boundary(card, state),
             "CLOAD" => self.cload(card, state),
             "DLOAD" | "DSLOAD" => self.dload(card, state, name == "DSLOAD"),
@@ -161,13 +163,17 @@ impl Reader {
             let time = if amplitude.total_time { state.time + duration } else { duration };
             Ok(interpolate(&amplitude.points, time).unwrap_or(1.0))
         };
-        let mut step = if let Procedure::Motion { .. } | Procedure::Harmonic { .. } = procedure {
+        let mut step = if let Procedure::Motion { .. }
+        | Procedure::Dynamic { .. }
+        | Procedure::Harmonic { .. } = procedure
+        {
             Step { courses: self.courses(procedure, state, line)?, ..state.loads(|_| Ok(0.0))? }
         } else {
             state.loads(&factor)?
         };
         (step.procedure, step.damping) = (procedure, damping);
-        step.large = state.large && procedure == Procedure::Static;
+        let may_be_large = matches!(procedure, Procedure::Static | Procedure::Dynamic { .. });
+        step.large = state.large && may_be_large;
         if let Procedure::Heat { .. } | Procedure::Modes { heat: true, .. } = procedure {
             for (&node, given) in &state.temperatures {
                 step.temperatures.insert(node, given.value * factor(&given.amplitude)?);
@@ -206,7 +212,7 @@ impl Reader {
             let mut points = Vec::new();
             if let Some(name) = &amplitude {
                 let found = self.amplitude_of(name, line)?;
-                let in_total = found.total_time && matches!(procedure, Procedure::Motion { .. });
+                let in_total = found.total_time && !matches!(procedure, Procedure::Harmonic { .. });
                 let begin = if in_total { state.time } else { 0.0 };
                 points.extend(found.points.iter().map(|&(at, factor)| (at - begin, factor)));
             }
@@ -234,7 +240,8 @@ impl Reader {
         procedure: Procedure,
         line: u32,
     ) -> Result<(), Fault> {
-        if base.held.values().all(|value| *value == 0.0) {
+        let in_modes = !matches!(procedure, Procedure::Dynamic { .. });
+        if !in_modes || base.held.values().all(|value| *value == 0.0) {
             return Ok(());
         }
         let is_stressed = |s: &Step| matches!(s.procedure, Procedure::Modes { stressed: true, .. });
@@ -276,7 +283,13 @@ impl Reader {
         if let Procedure::Motion { .. } | Procedure::Harmonic { .. } = procedure {
             return self.vibrates(state, line);
         }
-        if state.large && procedure == Procedure::Static {
+        if let Procedure::Dynamic { .. } = procedure {
+            lacks(|m| m.density.is_some(), "*DENSITY")?;
+            if !state.warm.is_empty() {
+                return Err(Fault::at(line, "a *TEMPERATURE in a *DYNAMIC step is not computed"));
+            }
+        }
+        if state.large && matches!(procedure, Procedure::Static | Procedure::Dynamic { .. }) {
             return self.turns();
         }
         let was_large = self.deck.steps.last().is_some_and(|s| s.large);
@@ -650,7 +663,7 @@ impl Reader {
 
     /// `*EQUATION`: how many terms, then node, component and factor of each.
     pub(super) fn equation(&mut self, card: &Card<'_>) -> Result<(), Fault> {
-        if plain(card) != "EQUATION" {
+        if plain(card) != "EQUATION" || ends(card) {
             return Ok(());
         }
         card.only(&[])?;
@@ -660,6 +673,7 @@ impl Reader {
             let count = count.filter(|n| (1..=100_000).contains(n));
             let count = count.ok_or_else(|| row.fault("here stands how many terms follow"))?;
             let mut terms: Vec<(u32, f64)> = Vec::new();
+            let mut first = None;
             for _ in 0..count.div_ceil(4) {
                 let next =
                     rows.next().ok_or_else(|| row.fault(format!("{count} terms must follow")))?;
@@ -671,11 +685,32 @@ impl Reader {
                 for [node, direction, factor] in all {
                     let (node, factor) = (self.node(node, next)?, next.number(factor)?);
                     let (at, _) = self.motion(node, component(direction, next)?, None, next)?;
+                    first.get_or_insert(at);
                     let own = self.deck.component(at.0, at.1);
                     terms.extend(own.into_iter().map(|(u, f)| (u, f * factor)));
                 }
             }
+            self.equations.extend(first.map(|at| (at, self.deck.equations.len())));
             self.deck.equations.push(Equation { terms, value: 0.0, line: row.line });
+        }
+        Ok(())
+    }
+
+    /// `*EQUATION, REMOVE` with components that come first in equations, and `REMOVE ALL`.
+    fn end_equations(&mut self, card: &Card<'_>, state: &State) -> Result<(), Fault> {
+        if !ends(card) {
+            return Ok(());
+        }
+        card.only(&["REMOVE", "REMOVE ALL"])?;
+        if card.get("REMOVE ALL").is_some() {
+            self.ended.push((state.step, None));
+        }
+        for row in card.rows() {
+            let [target, direction] = row.exactly("node or set, component")?;
+            let component = component(direction, row)?;
+            for node in self.some_nodes(target, row)? {
+                self.ended.push((state.step, Some((node, component))));
+            }
         }
         Ok(())
     }
@@ -744,6 +779,11 @@ impl Reader {
     }
 }
 
+/// Whether an `*EQUATION` ends others.
+fn ends(card: &Card<'_>) -> bool {
+    ["REMOVE", "REMOVE ALL"].into_iter().any(|word| card.get(word).is_some())
+}
+
 fn harmonic(open: Option<&Open>) -> bool {
     matches!(open.and_then(|o| o.procedure), Some(Procedure::Harmonic { .. }))
 }
@@ -797,6 +837,11 @@ fn procedure(card: &Card<'_>, name: &str, state: &mut State) -> Result<(), Fault
             card.only(&["SOLVER"])?;
             Procedure::Buckling { count: many(card, &numbers)? }
         }
+        "DYNAMIC" => {
+            card.only(&["SOLVER", "DIRECT", "ALPHA"])?;
+            open.duration = duration(card, &numbers)?;
+            dynamic(card, &numbers, open.duration)?
+        }
         "MODALDYNAMIC" => {
             card.only(&["SOLVER", "DIRECT", "DELTMX"])?;
             open.duration = duration(card, &numbers)?;
@@ -833,6 +878,22 @@ fn procedure(card: &Card<'_>, name: &str, state: &mut State) -> Result<(), Fault
     };
     open.procedure = Some(procedure);
     Ok(())
+}
+
+/// Motion by the equations themselves.
+fn dynamic(card: &Card<'_>, numbers: &[f64], duration: f64) -> Result<Procedure, Fault> {
+    let alpha = card.get("ALPHA").map_or(Ok(-0.05), |word| {
+        let range = -1.0 / 3.0 - 1e-9..=0.0;
+        let found = word.parse::<f64>().ok().filter(|alpha| range.contains(alpha));
+        found.ok_or_else(|| card.fault("ALPHA is a number from −1/3 to 0"))
+    })?;
+    let fixed = card.word("DIRECT").is_some_and(|word| word != "NO");
+    match numbers.first().copied().unwrap_or(duration) {
+        first if first > 0.0 && duration / first <= 1e6 => {
+            Ok(Procedure::Dynamic { increment: first.min(duration), fixed, duration, alpha })
+        }
+        first => Err(card.fault(format!("increments of {first} s in {duration} s"))),
+    }
 }
 
 /// Motion in increments that are fixed, or as fine as what acts.
