@@ -323,9 +323,9 @@ impl<'a> Element<'a> {
             let Stretched { at, law, axes, stress, .. } =
                 self.stretched(moved, point, warmth, &initial)?;
             let all: Vec<[Voigt; 3]> = at.slopes.iter().map(|s| turned(&axes, s)).collect();
-            for a in 0..n {
+            for (a, own) in all.iter().enumerate() {
                 let pulled = DVec3::from_array(transposed_times(&at.slopes[a], &stress));
-                for (i, strain) in all[a].iter().enumerate() {
+                for (i, strain) in own.iter().enumerate() {
                     let row = 3 * a + i;
                     f[row] -= at.volume * tensor::dot(&stress, strain);
                     let borne = tensor::apply(&law, strain);
