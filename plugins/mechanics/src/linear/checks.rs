@@ -97,6 +97,37 @@ fn a_bar_that_is_pulled_swings_as_its_modes_do() {
     (0..2).for_each(|i| near(end(&solved[1 + i]) / expected[i], 1.0, 2e-3));
 }
 
+/// The block on a spring of .3 N/m with a dashpot of .6 N·s/m beside it, pulled by 3 N from rest and
+/// shaken by them at 1 rad/s: ẍ + .2 ẋ + .1 x = 1.
+#[test]
+fn dashpots_slow_down_what_swings() {
+    let block = bar(1.0, 1, 1.0, "C3D20")
+        + "*NODE\n900,-1.,0.,0.\n*ELEMENT,TYPE=SPRINGA,ELSET=S\n900,900,1\n*SPRING,ELSET=S\n.3\n\
+           *ELEMENT,TYPE=DASHPOTA,ELSET=D\n901,900,1\n*DASHPOT,ELSET=D\n.6\n*BOUNDARY\nALL,2,3\n900,1,3\n";
+    let load = "*DLOAD\nALL,GRAV,1.,1.,0.,0.\n*END STEP\n";
+    let modes = "*STEP\n*FREQUENCY\n1\n*END STEP\n*STEP\n";
+    // s = .1, λ = .1, r = .3.
+    let swung = 10.0 * (1.0 - (-0.2f64).exp() * (0.6f64.cos() + 0.6f64.sin() / 3.0));
+    let moved = solve(&format!("{block}{modes}*MODAL DYNAMIC\n.5,2.\n{load}"));
+    near(moved[1].displacements[12].x / swung, 1.0, 2e-2);
+    let moved = solve(&format!("{block}*STEP\n*DYNAMIC,DIRECT,ALPHA=0.\n.01,2.\n{load}"));
+    near(moved[0].displacements[12].x / swung, 1.0, 2e-2);
+    let pace = 0.5 / PI;
+    let shaken = solve(&format!("{block}{modes}*STEADY STATE DYNAMICS\n{pace:?},{pace:?}\n{load}"));
+    // 1/(.1 − 1 + .2 i).
+    near(shaken[1].displacements[12].x, -0.9 / 0.85, 2e-2);
+    near(shaken[2].displacements[12].x, -0.2 / 0.85, 2e-2);
+}
+
+/// A spring that is soft from 1 m on, pulled along itself by 11 N.
+#[test]
+fn springs_follow_their_table_and_turn() {
+    let deck = "*NODE\n1,0,0,0\n2,1,0,0\n*ELEMENT,TYPE=SPRINGA,ELSET=S\n1,1,2\n\
+                *SPRING,ELSET=S,NONLINEAR\n0.,0.\n10.,1.\n100.,20.\n*BOUNDARY\n1,1,3\n2,2,3\n\
+                *STEP,NLGEOM\n*STATIC\n*CLOAD\n2,1,11.\n*END STEP\n";
+    near(solve(deck)[0].displacements[1].x, 1.0 + 19.0 / 90.0, 1e-9);
+}
+
 /// A block on a soft spring whose support follows a ramp moves with the ramp, and its modes by what
 /// the ramp's corner left: u = v (t − sin(ωt)/ω).
 #[test]

@@ -135,6 +135,10 @@ impl Course<'_> {
             let parts = own.mass.iter().zip(&own.stiffness);
             own.damping = parts.map(|(m, k)| mass * m + stiffness * k).collect();
             less(&mut own.open, &own.damping, speed);
+        } else if !self.step.large {
+            let spring = &self.deck.springs[e - self.deck.cells.len()];
+            spring.outer(spring.drag(0.0), &mut own.damping);
+            less(&mut own.open, &own.damping, speed);
         }
         Ok(own)
     }

@@ -262,13 +262,13 @@ fn turned(
     let [from, to] = [0, 3].map(|i| DVec3::from_slice(&own[i..]));
     let now = was + to - from;
     let along = now.try_normalize().ok_or(Folded)?;
-    let tension = spring.stiffness * (now.length() - was.length());
+    let [tension, stiffness] = spring.force(now.length() - was.length());
     let across = tension / now.length();
     for i in 0..3 {
         (f[i], f[3 + i]) = (f[i] + tension * along[i], f[3 + i] - tension * along[i]);
         for j in 0..3 {
             let unit = if i == j { across } else { 0.0 };
-            let own = (spring.stiffness - across) * along[i] * along[j] + unit;
+            let own = (stiffness - across) * along[i] * along[j] + unit;
             for (row, column, sign) in
                 [(i, j, 1.0), (3 + i, 3 + j, 1.0), (i, 3 + j, -1.0), (3 + i, j, -1.0)]
             {

@@ -28,6 +28,8 @@ pub(super) enum Link {
     Ground,
     /// SPRING2: a component of one node to a component of another.
     Components,
+    /// DASHPOTA: along the line between two nodes.
+    Damper,
     /// DCOUP3D: the node of a `*DISTRIBUTING COUPLING`.
     Coupling,
 }
@@ -38,6 +40,7 @@ impl Link {
             "SPRINGA" => Some(Self::Between),
             "SPRING1" => Some(Self::Ground),
             "SPRING2" => Some(Self::Components),
+            "DASHPOTA" => Some(Self::Damper),
             "DCOUP3D" => Some(Self::Coupling),
             _ => None,
         }
@@ -45,7 +48,7 @@ impl Link {
 
     pub(super) fn nodes(self) -> usize {
         match self {
-            Self::Between | Self::Components => 2,
+            Self::Between | Self::Damper | Self::Components => 2,
             Self::Ground | Self::Coupling => 1,
         }
     }
@@ -55,6 +58,7 @@ impl Reader {
     pub(super) fn linked(&mut self, card: &Card<'_>) -> Result<(), Fault> {
         match plain(card).as_str() {
             "SPRING" => self.spring(card),
+            "DASHPOT" => self.dashpot(card),
             "MPC" => self.multiple(card),
             "RIGIDBODY" => self.rigid_body(card),
             "DISTRIBUTINGCOUPLING" => self.coupling(card),
@@ -63,15 +67,20 @@ impl Reader {
     }
 
     fn spring(&mut self, card: &Card<'_>) -> Result<(), Fault> {
-        card.only(&["ELSET"])?;
+        card.only(&["ELSET", "NONLINEAR"])?;
         let elements = self.named_elements(card)?;
         let rows: Vec<Row<'_>> = card.rows().collect();
         let first = rows.first().ok_or_else(|| card.fault("needed is: stiffness"))?;
+        let law = if card.get("NONLINEAR").is_some() { self.law(card)? } else { Vec::new() };
         for element in elements {
             let raw = self.raw[element as usize].clone();
-            let Kind::Link(link) = raw.kind else {
+            let Kind::Link(link @ (Link::Between | Link::Ground | Link::Components)) = raw.kind
+            else {
                 return Err(card.fault(format!("element {} is no spring", raw.label)));
             };
+            if !law.is_empty() && link != Link::Between {
+                return Err(card.fault("NONLINEAR is of SPRINGA"));
+            }
             let components = match link {
                 Link::Between => Vec::new(),
                 _ => first.fields().map(|w| direction(w, *first)).collect::<Result<_, _>>()?,
@@ -85,7 +94,48 @@ impl Reader {
             })?;
             let ends: Option<[u32; 2]> =
                 raw.nodes.as_slice().try_into().ok().filter(|_| link == Link::Between);
-            self.deck.springs.push(Spring { terms, ends, stiffness });
+            let (law, drag) = (law.clone(), Vec::new());
+            self.deck.springs.push(Spring { terms, ends, stiffness, law, drag });
+            self.sprung.insert(element);
+        }
+        Ok(())
+    }
+
+    /// Force and elongation, line by line, to elongation and force.
+    fn law(&self, card: &Card<'_>) -> Result<Vec<(f64, f64)>, Fault> {
+        let mut law = Vec::new();
+        for row in card.rows() {
+            let [force, longer] = row.exactly("force, elongation")?;
+            let force = row.number(force)? * self.units.stress() * self.units.length().powi(2);
+            law.push((row.number(longer)? * self.units.length(), force));
+        }
+        let ascends = law.len() > 1 && law.is_sorted_by(|a, b| a.0 < b.0);
+        ascends.then_some(law).ok_or_else(|| card.fault("needed are two elongations, ascending"))
+    }
+
+    /// Force by speed, each with its frequency where it changes with that.
+    fn dashpot(&mut self, card: &Card<'_>) -> Result<(), Fault> {
+        card.only(&["ELSET"])?;
+        let mut drag = Vec::new();
+        for row in card.rows() {
+            let numbers = row.numbers("force by speed, frequency", 1..=2)?;
+            let frequency = numbers.get(1).copied().unwrap_or(0.0);
+            drag.push((frequency, numbers[0] * self.units.stress() * self.units.length()));
+        }
+        if drag.is_empty() || !drag.is_sorted_by(|a, b| a.0 < b.0) {
+            return Err(card.fault("needed are: force by speed, frequency, these ascending"));
+        }
+        for element in self.named_elements(card)? {
+            let raw = self.raw[element as usize].clone();
+            let found = match raw.kind {
+                Kind::Link(Link::Damper) => self.spring_terms(&raw.nodes, Link::Between, &[]),
+                _ => None,
+            };
+            let why =
+                || card.fault(format!("element {} is no dashpot, or has no length", raw.label));
+            let (terms, drag) = (found.ok_or_else(why)?, drag.clone());
+            let spring = Spring { terms, ends: None, stiffness: 0.0, law: Vec::new(), drag };
+            self.deck.springs.push(spring);
             self.sprung.insert(element);
         }
         Ok(())

@@ -77,13 +77,40 @@ pub(super) struct Spring {
     pub(super) ends: Option<[u32; 2]>,
     /// N/m.
     pub(super) stiffness: f64,
+    /// Elongation, m, and force, N, where these are not in proportion.
+    pub(super) law: Vec<(f64, f64)>,
+    /// Of a dashpot: frequency, Hz, and N·s/m.
+    pub(super) drag: Vec<(f64, f64)>,
 }
 
 impl Spring {
+    /// Its force when it is so much longer, and by how much that grows.
+    pub(super) fn force(&self, longer: f64) -> [f64; 2] {
+        let i = self.law.partition_point(|p| p.0 <= longer);
+        match (i.checked_sub(1).and_then(|i| self.law.get(i)), self.law.get(i)) {
+            (Some(&(x, f)), Some(&(y, g))) => {
+                let slope = (g - f) / (y - x);
+                [f + slope * (longer - x), slope]
+            }
+            (Some(&(_, f)), None) | (None, Some(&(_, f))) => [f, 0.0],
+            (None, None) => [self.stiffness * longer, self.stiffness],
+        }
+    }
+
+    /// Force by speed at a frequency, Hz; none of a spring.
+    pub(super) fn drag(&self, frequency: f64) -> f64 {
+        interpolate(&self.drag, frequency).unwrap_or(0.0)
+    }
+
     /// Adds its stiffness, row by row.
     pub(super) fn resist(&self, k: &mut [f64]) {
+        self.outer(self.stiffness, k);
+    }
+
+    /// Adds a matrix of its terms, row by row.
+    pub(super) fn outer(&self, factor: f64, k: &mut [f64]) {
         for (row, a) in k.chunks_mut(self.terms.len()).zip(&self.terms) {
-            let force = self.stiffness * a.1;
+            let force = factor * a.1;
             row.iter_mut().zip(&self.terms).for_each(|(k, b)| *k += force * b.1);
         }
     }

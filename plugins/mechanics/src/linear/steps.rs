@@ -8,6 +8,7 @@ use super::{
     constraint::Equation,
     flat::{Plane, SLICE},
     law::ORDER,
+    link::Link,
     matter::all_numbers,
     model::{Course, Damping, Heated, Material, Procedure, Pull, Step},
     read::{Kind, Reader, Surface, plain},
@@ -251,6 +252,9 @@ impl Reader {
                 "supports that move what is under stress are not computed",
             ));
         }
+        if self.deck.springs.iter().any(|s| !s.drag.is_empty()) {
+            return Err(Fault::at(line, "supports that move beside dashpots are not computed"));
+        }
         let Procedure::Motion { increment, .. } = procedure else { return Ok(()) };
         let follows =
             self.deck.steps.last().is_some_and(|s| matches!(s.procedure, Procedure::Motion { .. }));
@@ -289,8 +293,12 @@ impl Reader {
                 return Err(Fault::at(line, "a *TEMPERATURE in a *DYNAMIC step is not computed"));
             }
         }
-        if state.large && matches!(procedure, Procedure::Static | Procedure::Dynamic { .. }) {
+        let may_be_large = matches!(procedure, Procedure::Static | Procedure::Dynamic { .. });
+        if state.large && may_be_large {
             return self.turns();
+        }
+        if !heats && self.deck.springs.iter().any(|s| !s.law.is_empty()) {
+            return Err(Fault::at(line, "a *SPRING, NONLINEAR is computed with NLGEOM alone"));
         }
         let was_large = self.deck.steps.last().is_some_and(|s| s.large);
         if was_large && matches!(procedure, Procedure::Buckling { .. }) {
@@ -331,19 +339,20 @@ impl Reader {
 
     /// Every element is known where displacements are large.
     fn turns(&self) -> Result<(), Fault> {
-        let has_bubbles = |kind: Kind| match kind {
-            Kind::Solid(shape)
-            | Kind::Thin(Thin::Beam { shape, .. } | Thin::Shell { shape, .. }) => {
-                shape == Shape::Hex8Bubbles
-            }
-            Kind::Flat(_) | Kind::Link(_) => false,
+        let lacks = |kind: Kind| match kind {
+            Kind::Solid(Shape::Hex8Bubbles)
+            | Kind::Thin(
+                Thin::Beam { shape: Shape::Hex8Bubbles, .. }
+                | Thin::Shell { shape: Shape::Hex8Bubbles, .. },
+            ) => Some("C3D8I, B31 and S4"),
+            Kind::Link(Link::Damper) => Some("dashpots"),
+            _ => None,
         };
-        match self.raw.iter().find(|r| has_bubbles(r.kind)) {
+        match self.raw.iter().find_map(|raw| Some((raw, lacks(raw.kind)?))) {
             None => Ok(()),
-            Some(raw) => {
-                let why =
-                    "C3D8I, B31 and S4 are not computed where displacements are large (NLGEOM)";
-                Err(Fault::at(raw.line, format!("element {}: {why}", raw.label)))
+            Some((raw, what)) => {
+                let why = "are not computed where displacements are large (NLGEOM)";
+                Err(Fault::at(raw.line, format!("element {}: {what} {why}", raw.label)))
             }
         }
     }

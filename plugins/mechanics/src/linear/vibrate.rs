@@ -7,9 +7,10 @@
 use std::f64::consts::TAU;
 
 use intrados_stage::Job;
+use nalgebra::{DMatrix, DVector};
 
 use super::{
-    model::{Course, Damping, Deck, Procedure, Step},
+    model::{Course, Damping, Deck, Procedure, Spring, Step},
     modes::{Mode, dot},
     solve::{LinearError, Past, Solved, System},
 };
@@ -46,7 +47,8 @@ pub(super) fn solve(
     }
     let part = |course| Part::new(deck, course, (&still, modes), past, job);
     let parts = step.courses.iter().map(part).collect::<Result<Vec<_>, _>>()?;
-    let swings = Swings { modes, step, parts: &parts };
+    let drags = drags(deck, &still, modes);
+    let swings = Swings { modes, step, parts: &parts, drags };
     match step.procedure {
         Procedure::Harmonic { range, points, bias } => {
             let frequencies = frequencies(&modes.all, range, points, bias);
@@ -66,6 +68,19 @@ pub(super) fn solve(
         }
         _ => Ok(Vec::new()),
     }
+}
+
+/// Dashpots, and by how much a unit of each mode makes them longer.
+fn drags<'a>(deck: &'a Deck, still: &System<'_>, modes: &Modes) -> Vec<(&'a Spring, Vec<f64>)> {
+    let dashpots: Vec<&Spring> = deck.springs.iter().filter(|s| !s.drag.is_empty()).collect();
+    if dashpots.is_empty() {
+        return Vec::new();
+    }
+    let shapes: Vec<Vec<f64>> = modes.all.iter().map(|m| still.free.expanded(&m.shape)).collect();
+    let longer = |spring: &Spring, shape: &Vec<f64>| -> f64 {
+        spring.terms.iter().map(|&(u, f)| f * shape[u as usize]).sum()
+    };
+    dashpots.into_iter().map(|s| (s, shapes.iter().map(|u| longer(s, u)).collect())).collect()
 }
 
 /// What follows one course, as the modes feel it.
@@ -116,9 +131,65 @@ struct Swings<'a> {
     modes: &'a Modes,
     step: &'a Step,
     parts: &'a [Part<'a>],
+    drags: Vec<(&'a Spring, Vec<f64>)>,
 }
 
 impl Swings<'_> {
+    /// Damping of all modes together at a frequency, with that of dashpots, 1/s.
+    fn damped(&self, frequency: f64) -> DMatrix<f64> {
+        let n = self.modes.all.len();
+        let mut all =
+            DMatrix::from_fn(n, n, |i, j| if i == j { 2.0 * self.damping(i) } else { 0.0 });
+        for (spring, longer) in &self.drags {
+            let longer = DVector::from_column_slice(longer);
+            all += spring.drag(frequency) * &longer * longer.transpose();
+        }
+        all
+    }
+
+    /// Where modes that dashpots couple are after a time and how fast, under forces that grow evenly:
+    /// the exponential of the system, with 1 and the time as further states.
+    fn coupled(&self, state: &[[f64; 2]], force: &[[f64; 2]], time: f64) -> Vec<[f64; 2]> {
+        let n = state.len();
+        let damped = self.damped(0.0);
+        let mut system = DMatrix::<f64>::zeros(2 * n + 2, 2 * n + 2);
+        for i in 0..n {
+            system[(i, n + i)] = time;
+            system[(n + i, i)] = -time * self.modes.all[i].value;
+            for j in 0..n {
+                system[(n + i, n + j)] = -time * damped[(i, j)];
+            }
+            system[(n + i, 2 * n)] = time * force[i][0];
+            system[(n + i, 2 * n + 1)] = time * force[i][1];
+        }
+        system[(2 * n + 1, 2 * n)] = time;
+        let mut begin = DVector::<f64>::zeros(2 * n + 2);
+        for (i, [place, speed]) in state.iter().enumerate() {
+            (begin[i], begin[n + i]) = (*place, *speed);
+        }
+        begin[2 * n] = 1.0;
+        let end = system.exp() * begin;
+        (0..n).map(|i| [end[i], end[n + i]]).collect()
+    }
+
+    /// Real and imaginary part of modes that dashpots couple, under forces at a frequency.
+    fn coupled_at(&self, frequency: f64, force: &[[f64; 2]]) -> Option<[Vec<f64>; 2]> {
+        let (n, pace) = (force.len(), TAU * frequency);
+        let damped = self.damped(frequency);
+        let mut system = DMatrix::<f64>::zeros(2 * n, 2 * n);
+        for i in 0..n {
+            let inert = self.modes.all[i].value - pace * pace;
+            (system[(i, i)], system[(n + i, n + i)]) = (inert, inert);
+            for j in 0..n {
+                system[(i, n + j)] = -pace * damped[(i, j)];
+                system[(n + i, j)] = pace * damped[(i, j)];
+            }
+        }
+        let forces = DVector::from_fn(2 * n, |i, _| force[i % n][i / n]);
+        let found = system.lu().solve(&forces)?;
+        Some([0, n].map(|from| (from..from + n).map(|i| found[i]).collect()))
+    }
+
     /// s of a mode, 1/s.
     fn damping(&self, mode: usize) -> f64 {
         let square = self.modes.all[mode].value;
@@ -151,6 +222,13 @@ impl Swings<'_> {
             job.step(k, times.len())?;
             let after = self.pushed(pair[1], long);
             let length = pair[1] - pair[0];
+            if !self.drags.is_empty() {
+                let grown = before.iter().zip(&after).map(|(a, b)| [*a, (b - a) / length]);
+                let grown: Vec<[f64; 2]> = grown.collect();
+                state = self.coupled(&state, &grown, length);
+                before = after;
+                continue;
+            }
             for (i, own) in state.iter_mut().enumerate() {
                 let force = [before[i], (after[i] - before[i]) / length];
                 let mode = [self.modes.all[i].value, self.damping(i)];
@@ -204,19 +282,28 @@ impl Swings<'_> {
         let pace = TAU * frequency;
         let factors: Vec<f64> = self.parts.iter().map(|p| p.factor(frequency)).collect();
         let mut places = [Vec::new(), Vec::new()];
+        let mut forces = Vec::with_capacity(self.modes.all.len());
+        let resonance = || LinearError::Resonance { step: self.step.name.clone(), frequency };
         for (i, mode) in self.modes.all.iter().enumerate() {
             let mut force = [0.0; 2];
             for (part, factor) in self.parts.iter().zip(&factors) {
                 force[0] += factor * (part.forces[i] + pace * pace * part.inertia[i]);
                 force[1] += factor * (part.early[i] - self.drag() * pace * part.inertia[i]);
             }
+            forces.push(force);
+            if !self.drags.is_empty() {
+                continue;
+            }
             let resists = [mode.value - pace * pace, 2.0 * self.damping(i) * pace];
             let square = resists[0] * resists[0] + resists[1] * resists[1];
             if square.sqrt() <= FREE * mode.value {
-                return Err(LinearError::Resonance { step: self.step.name.clone(), frequency });
+                return Err(resonance());
             }
             places[0].push((force[0] * resists[0] + force[1] * resists[1]) / square);
             places[1].push((force[1] * resists[0] - force[0] * resists[1]) / square);
+        }
+        if !self.drags.is_empty() {
+            places = self.coupled_at(frequency, &forces).ok_or_else(resonance)?;
         }
         let none = vec![0.0; factors.len()];
         let [real, imaginary] = [(&places[0], &factors, "real"), (&places[1], &none, "imaginary")]
