@@ -20,8 +20,10 @@ import tempfile
 from pathlib import Path
 
 AGREES = 1e-4
-PRINTS = ("NODEPRINT", "ELPRINT", "NODEFILE", "ELFILE", "CONTACTFILE", "CONTACTPRINT", "SECTIONPRINT", "FACEPRINT", "NODEOUTPUT", "ELEMENTOUTPUT")
+PRINTS = ("CONTROLS", "NODEPRINT", "ELPRINT", "NODEFILE", "ELFILE", "CONTACTFILE", "CONTACTPRINT", "SECTIONPRINT", "FACEPRINT", "NODEOUTPUT", "ELEMENTOUTPUT")
 NODES, POINTS = "*NODE PRINT,NSET=ZZALL,GLOBAL=YES,FREQUENCY=100000", "*EL PRINT,ELSET=ZZALL,GLOBAL=YES,FREQUENCY=100000"
+# How far CalculiX goes on where displacements are large: of itself it is content with half a per cent of the forces.
+EXACT = "*CONTROLS,PARAMETERS=FIELD\n1.E-7,1.E-7,,,1.E-7,1.E-7,1.E-7"
 # What a step without these is asked for would be printed for every mode.
 NOTHING = ["*NODE PRINT,FREQUENCY=0", "*EL PRINT,FREQUENCY=0"]
 PROCEDURES = ("STATIC", "DYNAMIC", "FREQUENCY", "BUCKLE", "HEATTRANSFER", "MODALDYNAMIC", "STEADYSTATEDYNAMICS")
@@ -66,6 +68,8 @@ def printing(text, nodes, elements):
                 lines.append(named("NSET", nodes))
                 if elements:
                     lines.append(named("ELSET", elements))
+            if name == "STEP" and "NLGEOM" in line.upper():
+                lines.append(EXACT)
             if name in PROCEDURES:
                 procedure = line
             if name == "ENDSTEP":
