@@ -233,6 +233,26 @@ fn a_cantilever_bends_as_the_elastica() {
     near(end(&solved[1]).length(), 0.0, 1e-6);
 }
 
+/// A bar pulled beyond yield by forces, 1 % and a bit: bilinear as its table, then let go, which
+/// leaves what has flowed.
+#[test]
+fn bars_of_metal_keep_what_has_flowed() {
+    let stress = 2.2;
+    let deck = cube(&format!(
+        "*STEP,NLGEOM\n*STATIC\n*DLOAD\n1,P2,-{stress:?}\n*END STEP\n*STEP\n*STATIC\n*DLOAD,OP=NEW\n1,P2,0.\n*END STEP\n"
+    ))
+    .replace("*DENSITY", "*PLASTIC\n2.,0.\n4.,.1\n*DENSITY");
+    let solved = solve(&deck);
+    let flowed = (stress - 2.0) / 20.0;
+    near(solved[0].displacements.last().unwrap().x / (stress / E + flowed), 1.0, 2e-2);
+    near(solved[1].displacements.last().unwrap().x / flowed, 1.0, 2e-2);
+    solved[0].stresses.iter().flatten().for_each(|s| near(s[0], stress, 1e-6));
+    solved[1].stresses.iter().flatten().flatten().for_each(|s| near(*s, 0.0, 1e-6));
+    let why =
+        parse(deck.replace(",NLGEOM", "").as_bytes(), Path::new("deck.inp"), Units::MetreNewton);
+    assert!(why.unwrap_err().to_string().contains("material M: *PLASTIC is computed of what"));
+}
+
 /// A body that turns by a quarter of a circle has no stress.
 #[test]
 fn bodies_turn_far_without_stress() {

@@ -8,7 +8,7 @@ use intrados_stage::Job;
 
 use super::{
     element::Folded,
-    large::{about, settled, started, true_stresses, unbalanced},
+    large::{about, ends, settled, started, unbalanced},
     model::{Deck, Procedure, Step},
     solve::{LinearError, Loads, Past, Solved, System, unknowns},
 };
@@ -57,7 +57,7 @@ pub(super) fn solve(
     let now = step.at(duration);
     let system = course.system(&now, &state.place)?;
     let solved = if step.large {
-        system.told(step.name.clone(), &state.place, true_stresses(&system, &state.place)?)
+        system.told(step.name.clone(), &state.place, ends(&system, &state.place, &[])?.0)
     } else {
         system.finished(step.name.clone(), &state.place)?
     };
@@ -116,7 +116,7 @@ impl Course<'_> {
             Own { mass: zeros(), damping: zeros(), stiffness: zeros(), open: vec![0.0; n] };
         let is_element = e < self.deck.cells.len();
         if self.step.large {
-            unbalanced(system, loads, e, place, &mut own.stiffness, &mut own.open)?;
+            unbalanced(system, loads, &[], e, place, &mut own.stiffness, &mut own.open)?;
         } else {
             if is_element {
                 let (element, warmth) = (system.element(e), system.warmth(e));

@@ -4,7 +4,9 @@ use glam::DVec3;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::{
+    law::Elastic,
     model::{Cell, Deck, Material, Orientation, Step},
+    plastic::{Flow, Metal},
     shape::{Jet, Point, Shape, face_functions},
 };
 use crate::tensor::{self, Frame, Tangent, Voigt};
@@ -285,9 +287,11 @@ impl<'a> Element<'a> {
         (p, (natural, weight)): (usize, Point),
         warmth: &Warmth,
         initial: &impl Fn(usize) -> Voigt,
+        flow: &[Flow],
     ) -> Result<Stretched, Folded> {
         let mut at = self.at(natural, weight)?;
         let (law, free) = self.local(p, &at, warmth);
+        let metal = self.metal(p, self.warmth(p, &at, warmth)[0]);
         let swelling = swelling(&free);
         let inverse = swelling.try_inverse().ok_or(Folded)?;
         for slope in &mut at.slopes {
@@ -305,8 +309,24 @@ impl<'a> Element<'a> {
         // Green's strain.
         let half = |a: DVec3| 0.5 * (a.length_squared() - 1.0);
         let strain = [half(x), half(y), half(z), x.dot(y), y.dot(z), z.dot(x)];
-        let stress = tensor::add(&tensor::apply(&law, &strain), &initial(p));
-        Ok(Stretched { at, law, axes: [x, y, z], volume, stress })
+        let flow = flow.get(p).copied().unwrap_or_default();
+        let (stress, law, flow) = match metal {
+            Some(metal) => metal.tangent(&strain, &flow).ok_or(Folded)?,
+            None => (tensor::apply(&law, &strain), law, flow),
+        };
+        let stress = tensor::add(&stress, &initial(p));
+        Ok(Stretched { at, law, axes: [x, y, z], volume, stress, flow })
+    }
+
+    /// What flows at a point of integration, if it does.
+    fn metal(&self, point: usize, temperature: f64) -> Option<Metal<'_>> {
+        let (material, _) = self.matter(point);
+        match (&material.plastic, &material.elastic) {
+            (Some(hardening), Some(Elastic::Isotropic(table))) => {
+                Some(Metal { elastic: table.at(temperature), hardening })
+            }
+            _ => None,
+        }
     }
 
     /// Tangent and what the inside pushes back with, where displacements are large.
@@ -315,13 +335,14 @@ impl<'a> Element<'a> {
         moved: &Self,
         warmth: &Warmth,
         initial: impl Fn(usize) -> Voigt,
+        flow: &[Flow],
         k: &mut [f64],
         f: &mut [f64],
     ) -> Result<(), Folded> {
         let n = self.places.len();
         for point in self.points().into_iter().enumerate() {
             let Stretched { at, law, axes, stress, .. } =
-                self.stretched(moved, point, warmth, &initial)?;
+                self.stretched(moved, point, warmth, &initial, flow)?;
             let all: Vec<[Voigt; 3]> = at.slopes.iter().map(|s| turned(&axes, s)).collect();
             for (a, own) in all.iter().enumerate() {
                 let pulled = DVec3::from_array(transposed_times(&at.slopes[a], &stress));
@@ -342,21 +363,24 @@ impl<'a> Element<'a> {
         Ok(())
     }
 
-    /// Stress at every point in what is there (Cauchy), where displacements are large.
+    /// Stress at every point in what is there (Cauchy), and what has flowed, where displacements are
+    /// large.
     pub(super) fn true_stresses(
         &self,
         moved: &Self,
         warmth: &Warmth,
         initial: impl Fn(usize) -> Voigt,
-    ) -> Result<Vec<Voigt>, Folded> {
+        flow: &[Flow],
+    ) -> Result<Vec<(Voigt, Flow)>, Folded> {
         let stress = |point| {
-            let there = self.stretched(moved, point, warmth, &initial)?;
+            let there = self.stretched(moved, point, warmth, &initial, flow)?;
             let [x, y, z] = there.axes.map(|a| Vector3::new(a.x, a.y, a.z));
             let deformed = Matrix3::from_columns(&[x, y, z]);
             let s = there.stress;
             let along = Matrix3::new(s[0], s[3], s[5], s[3], s[1], s[4], s[5], s[4], s[2]);
             let t = deformed * along * deformed.transpose() / there.volume;
-            Ok([t[(0, 0)], t[(1, 1)], t[(2, 2)], t[(0, 1)], t[(1, 2)], t[(2, 0)]])
+            let stress = [t[(0, 0)], t[(1, 1)], t[(2, 2)], t[(0, 1)], t[(1, 2)], t[(2, 0)]];
+            Ok((stress, there.flow))
         };
         self.points().into_iter().enumerate().map(stress).collect()
     }
@@ -478,6 +502,7 @@ struct Stretched {
     /// Over what it was.
     volume: f64,
     stress: Voigt,
+    flow: Flow,
 }
 
 /// 1 + free strain, as a matrix.

@@ -13,6 +13,7 @@ use super::{
     constraint::{Equation, Sum},
     element::Folded,
     model::{Deck, Spring, Step},
+    plastic::Flow,
     solve::{LinearError, Loads, Past, Solved, System, sums, unknowns},
 };
 use crate::{
@@ -36,8 +37,8 @@ pub(super) fn solve(
     past: &mut Past,
     job: &Job,
 ) -> Result<Solved, LinearError> {
-    let (all, solved) = moved(deck, step, past, job)?;
-    (past.displacements, past.large) = (all, true);
+    let (all, flow, solved) = moved(deck, step, past, job)?;
+    (past.displacements, past.flow, past.large) = (all, flow, true);
     past.stresses.clone_from(&solved.stresses);
     Ok(solved)
 }
@@ -47,13 +48,15 @@ fn moved(
     step: &Step,
     past: &Past,
     job: &Job,
-) -> Result<(Vec<f64>, Solved), LinearError> {
+) -> Result<(Vec<f64>, Vec<Vec<Flow>>, Solved), LinearError> {
     let way = Way::new(deck, step, past)?;
     let (mut all, mut share, mut part) = (way.start.clone(), 0.0, 1.0);
+    let (mut stresses, mut flow) = (Vec::new(), past.flow.clone());
     while share < 1.0 {
         job.step((1e4 * share) as usize, 10_000)?;
         let next = f64::min(1.0, share + part);
-        if let Some(found) = way.settled(next, &all, job)? {
+        if let Some(found) = way.settled(next, &all, &flow, job)? {
+            (stresses, flow) = ends(&way.still, &found, &flow)?;
             (all, share, part) = (found, next, 2.0 * part);
         } else if part > LEAST {
             part *= 0.5;
@@ -62,9 +65,8 @@ fn moved(
             return Err(LinearError::NotConverged { step: step.name.clone(), what });
         }
     }
-    let system = way.system(1.0, &all)?;
-    let solved = system.told(step.name.clone(), &all, true_stresses(&system, &all)?);
-    Ok((all, solved))
+    let solved = way.system(1.0, &all)?.told(step.name.clone(), &all, stresses);
+    Ok((all, flow, solved))
 }
 
 /// What a step of vibrations is about, and the stiffness where the step before has left it.
@@ -79,8 +81,10 @@ pub(super) fn tangent<'a>(
     bend(deck, step, &mut equations, &all);
     let system = System::of(deck, step, past, sums(deck, step, &equations)?, true);
     let loads = system.distributed()?;
-    let (matrix, _) = system
-        .assembled(job, |e, k, f| unbalanced(&system, &loads, e, &own(deck, e, &all), k, f))?;
+    let (matrix, _) = system.assembled(job, |e, k, f| {
+        let flow = of_element(&past.flow, e);
+        unbalanced(&system, &loads, flow, e, &own(deck, e, &all), k, f)
+    })?;
     Ok((system, matrix))
 }
 
@@ -96,17 +100,20 @@ struct Way<'a> {
     said: Vec<f64>,
     /// Forces of every element and spring that are out of balance then.
     open: Vec<Vec<f64>>,
+    /// Its elements, with nothing that is free.
+    still: System<'a>,
 }
 
 impl<'a> Way<'a> {
     fn new(deck: &'a Deck, step: &'a Step, past: &'a Past) -> Result<Self, LinearError> {
         let start = started(deck, past);
-        let system = System::of(deck, step, past, vec![Sum::default(); start.len()], true);
-        let loads = system.distributed()?;
+        let still = System::of(deck, step, past, vec![Sum::default(); start.len()], true);
+        let loads = still.distributed()?;
         let open = |e: usize| {
             let own = own(deck, e, &start);
             let (mut k, mut f) = (vec![0.0; own.len() * own.len()], vec![0.0; own.len()]);
-            unbalanced(&system, &loads, e, &own, &mut k, &mut f).map_err(|Folded| {
+            let flow = of_element(&past.flow, e);
+            unbalanced(&still, &loads, flow, e, &own, &mut k, &mut f).map_err(|Folded| {
                 LinearError::Folded(deck.cells.get(e).map_or(0, |cell| cell.label))
             })?;
             Ok(f)
@@ -114,7 +121,7 @@ impl<'a> Way<'a> {
         let count = deck.cells.len() + deck.springs.len();
         let open = (0..count).map(open).collect::<Result<Vec<_>, LinearError>>()?;
         let said = deck.constraints(step, past).iter().map(|e| left(e, &start)).collect();
-        Ok(Self { deck, step, past, loads, start, said, open })
+        Ok(Self { deck, step, past, loads, start, said, open, still })
     }
 
     /// The unknowns with what changes lead to where constraints of a share of the step hold.
@@ -131,11 +138,13 @@ impl<'a> Way<'a> {
         &self,
         share: f64,
         from: &[f64],
+        flow: &[Vec<Flow>],
         job: &Job,
     ) -> Result<Option<Vec<f64>>, LinearError> {
         let forces = self.step.forces.iter().map(|(&at, force)| (at, share * force)).collect();
         let fill = |system: &System<'_>, all: &[f64], e: usize, k: &mut [f64], f: &mut [f64]| {
-            unbalanced(system, &self.loads, e, &own(self.deck, e, all), k, f)?;
+            let flow = of_element(flow, e);
+            unbalanced(system, &self.loads, flow, e, &own(self.deck, e, all), k, f)?;
             f.iter_mut().zip(&self.open[e]).for_each(|(f, open)| *f -= (1.0 - share) * open);
             Ok::<_, Folded>(())
         };
@@ -223,6 +232,7 @@ fn bend(deck: &Deck, step: &Step, equations: &mut [Equation], all: &[f64]) {
 pub(super) fn unbalanced(
     system: &System<'_>,
     loads: &Loads<'_>,
+    flow: &[Flow],
     e: usize,
     own: &[f64],
     k: &mut [f64],
@@ -234,7 +244,7 @@ pub(super) fn unbalanced(
     }
     let (element, warmth) = (system.element(e), system.warmth(e));
     let moved = element.moved(own);
-    element.large(&moved, &warmth, system.initial(e), k, f)?;
+    element.large(&moved, &warmth, system.initial(e), flow, k, f)?;
     let (pressures, pulls) = loads.of(e);
     for &(face, pressure) in pressures {
         moved.pressure(usize::from(face), pressure, f);
@@ -279,17 +289,25 @@ fn turned(
     Ok(())
 }
 
-pub(super) fn true_stresses(
+/// True stresses, and what has flowed at every point, of displacements that follow on others.
+pub(super) fn ends(
     system: &System<'_>,
     all: &[f64],
-) -> Result<Vec<Vec<Voigt>>, LinearError> {
-    let stress = |e: usize| {
+    flow: &[Vec<Flow>],
+) -> Result<(Vec<Vec<Voigt>>, Vec<Vec<Flow>>), LinearError> {
+    let end = |e: usize| {
         let element = system.element(e);
         let moved = element.moved(&own(system.deck, e, all));
-        let found = element.true_stresses(&moved, &system.warmth(e), system.initial(e));
-        found.map_err(|Folded| LinearError::Folded(system.deck.cells[e].label))
+        let (warmth, flow) = (system.warmth(e), of_element(flow, e));
+        let found = element.true_stresses(&moved, &warmth, system.initial(e), flow);
+        let found = found.map_err(|Folded| LinearError::Folded(system.deck.cells[e].label))?;
+        Ok::<(Vec<Voigt>, Vec<Flow>), LinearError>(found.into_iter().unzip())
     };
-    (0..system.deck.cells.len()).map(stress).collect()
+    (0..system.deck.cells.len()).map(end).collect()
+}
+
+fn of_element(flow: &[Vec<Flow>], e: usize) -> &[Flow] {
+    flow.get(e).map_or(&[][..], Vec::as_slice)
 }
 
 /// Displacements of every unknown that the steps before have left.
@@ -337,7 +355,7 @@ mod tests {
                 let at: Vec<f64> = (0..n).map(|i| 0.1 * (1.7 * i as f64).sin()).collect();
                 let forces = |own: &[f64]| {
                     let (mut k, mut f) = (vec![0.0; n * n], vec![0.0; n]);
-                    unbalanced(&system, &loads, e, own, &mut k, &mut f).unwrap();
+                    unbalanced(&system, &loads, &[], e, own, &mut k, &mut f).unwrap();
                     (k, f)
                 };
                 let (tangent, _) = forces(&at);

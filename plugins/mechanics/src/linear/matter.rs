@@ -6,6 +6,7 @@ use nalgebra::Matrix3;
 use super::{
     law::{Elastic, Expansion, Table},
     model::{Material, Orientation},
+    plastic::Hardening,
     read::{Kind, Reader, Section, plain},
     shape::Shape,
     thin::{Hollow, Profile, Thin},
@@ -33,7 +34,8 @@ impl Reader {
                 self.in_material = true;
                 Ok(())
             }
-            "ELASTIC" | "DENSITY" | "EXPANSION" | "CONDUCTIVITY" | "SPECIFICHEAT" | "DAMPING" => {
+            "ELASTIC" | "DENSITY" | "EXPANSION" | "CONDUCTIVITY" | "SPECIFICHEAT" | "DAMPING"
+            | "PLASTIC" => {
                 if !in_material {
                     return Err(card.fault(format!("*{} must stand under a *MATERIAL", card.name)));
                 }
@@ -82,6 +84,7 @@ impl Reader {
                 }
                 material.conductivity = Some(table);
             }
+            "PLASTIC" => material.plastic = Some(hardening(card, units.stress())?),
             "DAMPING" => {
                 card.only(&["ALPHA", "BETA"])?;
                 for (to, name) in material.damping.iter_mut().zip(["ALPHA", "BETA"]) {
@@ -420,6 +423,31 @@ fn elastic(card: &Card<'_>, kind: &str, numbers: &[f64], unit: f64) -> Result<El
         |law: [[f64; 6]; 6]| nalgebra::Matrix6::from_fn(|i, j| law[i][j]).cholesky().is_some();
     let all = law.all().into_iter().all(is_positive);
     all.then_some(law).ok_or_else(|| card.fault("*ELASTIC: this law is not positive definite"))
+}
+
+/// True stress and plastic strain of each line.
+fn hardening(card: &Card<'_>, unit: f64) -> Result<Hardening, Fault> {
+    card.only(&["HARDENING"])?;
+    let kinematic = match card.word("HARDENING").as_deref() {
+        None | Some("ISOTROPIC") => false,
+        Some("KINEMATIC") => true,
+        Some(other) => {
+            let other = quote(other);
+            return Err(
+                card.fault(format!("HARDENING={other}: ISOTROPIC and KINEMATIC are supported"))
+            );
+        }
+    };
+    let mut table: Vec<(f64, f64)> = Vec::new();
+    for row in card.rows() {
+        let [stress, strain] = row.exactly("true stress, plastic strain")?;
+        table.push((row.number(strain)?, row.number(stress)? * unit));
+    }
+    let begins = table.first().is_some_and(|first| first.0 == 0.0 && first.1 > 0.0);
+    let grows = table.is_sorted_by(|a, b| a.0 < b.0 && a.1 <= b.1);
+    (begins && grows).then_some(Hardening { kinematic, table }).ok_or_else(|| {
+        card.fault("*PLASTIC begins at a plastic strain of 0 and a stress above 0; both grow")
+    })
 }
 
 /// E₁, E₂, E₃, ν₁₂, ν₁₃, ν₂₃, G₁₂, G₁₃, G₂₃ to the constants of [`Elastic::Orthotropic`].

@@ -8,6 +8,7 @@ use super::{
     constraint::Equation,
     curve::Curved,
     law::{Elastic, Expansion, Table},
+    plastic::Hardening,
     shape::{Point, Shape},
 };
 use crate::{
@@ -122,6 +123,7 @@ pub(super) struct Material {
     pub(super) name: String,
     pub(super) elastic: Option<Elastic>,
     pub(super) expansion: Option<Expansion>,
+    pub(super) plastic: Option<Hardening>,
     /// kg/m³.
     pub(super) density: Option<Table<1>>,
     /// Along its own axes, W/(m·K).

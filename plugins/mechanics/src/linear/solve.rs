@@ -13,6 +13,7 @@ use super::{
     heat, large,
     model::{Deck, Procedure, Pull, Spring, Step},
     modes::{self, Mode},
+    plastic::Flow,
     vibrate,
 };
 use crate::{
@@ -138,6 +139,8 @@ pub(super) struct Past {
     /// The same by the second; empty after a step that is none of motion.
     pub(super) speeds: Vec<f64>,
     pub(super) stresses: Vec<Vec<Voigt>>,
+    /// What has flowed at every point; empty: nothing.
+    pub(super) flow: Vec<Vec<Flow>>,
     /// Whether they are of equilibrium where everything has gone to.
     pub(super) large: bool,
     /// Of every node.

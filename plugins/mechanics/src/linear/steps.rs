@@ -7,7 +7,7 @@ use glam::DVec3;
 use super::{
     constraint::Equation,
     flat::{Plane, SLICE},
-    law::ORDER,
+    law::{Elastic, ORDER},
     link::Link,
     matter::all_numbers,
     model::{Course, Damping, Heated, Material, Procedure, Pull, Step},
@@ -283,6 +283,18 @@ impl Reader {
             matches!(procedure, Procedure::Heat { .. } | Procedure::Modes { heat: true, .. });
         if !heats {
             lacks(|m| m.elastic.is_some(), "*ELASTIC")?;
+            let flows = match procedure {
+                Procedure::Static => state.large,
+                other => matches!(other, Procedure::Modes { .. }),
+            };
+            let is_known = |m: &Material| {
+                (flows && matches!(m.elastic, Some(Elastic::Isotropic(_)))) || m.plastic.is_none()
+            };
+            let mut used = used.clone().map(|m| &self.deck.materials[m as usize]);
+            if let Some(material) = used.find(|m| !is_known(m)) {
+                let why = "*PLASTIC is computed of what is isotropic, in *STATIC with NLGEOM";
+                return Err(Fault::at(line, format!("material {}: {why}", material.name)));
+            }
         }
         if let Procedure::Motion { .. } | Procedure::Harmonic { .. } = procedure {
             return self.vibrates(state, line);

@@ -409,10 +409,10 @@ fn a_disc_that_spins_has_the_stress_of_the_closed_form() {
 
 #[test]
 fn all_that_is_not_computed_is_named_at_once() {
-    let deck = "*NODE\n1,0,0\n*ELEMENT,TYPE=F3D8,ELSET=ALL\n1,1\n*MATERIAL,NAME=M\n*PLASTIC\n1,2\n*STEP\n*COMPLEX FREQUENCY\n3\n*END STEP\n";
+    let deck = "*NODE\n1,0,0\n*ELEMENT,TYPE=F3D8,ELSET=ALL\n1,1\n*MATERIAL,NAME=M\n*CREEP\n1,2\n*STEP\n*COMPLEX FREQUENCY\n3\n*END STEP\n";
     let line = refusal(deck);
     for part in
-        ["deck.inp:3: elements of type \"F3D8\"", "line 6: *PLASTIC", "line 9: *COMPLEX FREQUENCY"]
+        ["deck.inp:3: elements of type \"F3D8\"", "line 6: *CREEP", "line 9: *COMPLEX FREQUENCY"]
     {
         assert!(line.contains(part), "{line}");
     }
