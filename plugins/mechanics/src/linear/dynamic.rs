@@ -19,7 +19,7 @@ const ACCURACY: f64 = 1e-4;
 /// Increments.
 const MANY: usize = 1_000_000;
 /// ‖f − M a‖ / ‖f‖ of accelerations at the beginning.
-const TOLERANCE: f64 = 1e-9;
+const TOLERANCE: f64 = 1e-7;
 
 /// The end of a step of motion.
 pub(super) fn solve(

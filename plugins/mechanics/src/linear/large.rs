@@ -23,7 +23,7 @@ use crate::{
 
 /// Newton's steps.
 const STEPS: usize = 30;
-/// Change of a displacement that counts as none, over the largest.
+/// Change of a displacement that counts as none, over the largest before and after.
 const SETTLED: f64 = 1e-9;
 /// ‖f − K u‖ / ‖f‖ of every change.
 const TOLERANCE: f64 = 1e-6;
@@ -162,6 +162,7 @@ pub(super) fn settled<'a>(
     forces: &BTreeMap<(u32, u8), f64>,
     job: &Job,
 ) -> Result<Option<Vec<f64>>, LinearError> {
+    let largest = |all: &[f64]| all.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
     let mut all = from.to_vec();
     for _ in 0..STEPS {
         let system = about(&all)?;
@@ -189,12 +190,11 @@ pub(super) fn settled<'a>(
         };
         let change = system.free.expanded(&free);
         all.iter_mut().zip(&change).for_each(|(u, d)| *u += d);
-        let largest = |all: &[f64]| all.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
         let moved = largest(&change);
         if !moved.is_finite() {
             return Ok(None);
         }
-        if moved <= SETTLED * largest(&all) {
+        if moved <= SETTLED * largest(from).max(largest(&all)) {
             return Ok((negative == 0).then_some(all));
         }
     }
