@@ -419,10 +419,16 @@ fn elastic(card: &Card<'_>, kind: &str, numbers: &[f64], unit: f64) -> Result<El
             )));
         }
     };
-    let is_positive =
-        |law: [[f64; 6]; 6]| nalgebra::Matrix6::from_fn(|i, j| law[i][j]).cholesky().is_some();
-    let all = law.all().into_iter().all(is_positive);
-    all.then_some(law).ok_or_else(|| card.fault("*ELASTIC: this law is not positive definite"))
+    // What bears no shear is a fluid: whether a structure of it can move, its equations say.
+    let resists = |law: [[f64; 6]; 6]| {
+        if !law.iter().flatten().all(|value| value.is_finite()) {
+            return false;
+        }
+        let all = nalgebra::Matrix6::from_fn(|i, j| law[i][j]).symmetric_eigenvalues();
+        all.min() >= -1e-9 * all.max().abs()
+    };
+    let all = law.all().into_iter().all(resists);
+    all.then_some(law).ok_or_else(|| card.fault("*ELASTIC: this law gives way to some strain"))
 }
 
 /// True stress and plastic strain of each line.
