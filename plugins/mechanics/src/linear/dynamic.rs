@@ -8,8 +8,9 @@ use intrados_stage::Job;
 
 use super::{
     element::Folded,
-    large::{about, ends, settled, started, unbalanced},
+    large::{about, ends, of_element, settled, started, unbalanced},
     model::{Deck, Procedure, Step},
+    plastic::Flow,
     solve::{LinearError, Loads, Past, Solved, System, unknowns},
 };
 use crate::sparse::{Constraints, Method, solve as direct};
@@ -57,11 +58,12 @@ pub(super) fn solve(
     let now = step.at(duration);
     let system = course.system(&now, &state.place)?;
     let solved = if step.large {
-        system.told(step.name.clone(), &state.place, ends(&system, &state.place, &[])?.0)
+        system.told(step.name.clone(), &state.place, ends(&system, &state.place, &state.flow)?.0)
     } else {
         system.finished(step.name.clone(), &state.place)?
     };
     (past.displacements, past.speeds, past.large) = (state.place, state.speed, step.large);
+    past.flow = state.flow;
     past.stresses.clone_from(&solved.stresses);
     Ok(solved)
 }
@@ -76,6 +78,8 @@ struct State {
     open: Vec<Vec<f64>>,
     /// At nodes.
     forces: BTreeMap<(u32, u8), f64>,
+    /// What has flowed at every point.
+    flow: Vec<Vec<Flow>>,
 }
 
 /// Matrices of an element by rows, and what is out of balance in it.
@@ -109,6 +113,7 @@ impl Course<'_> {
         (system, loads): (&System<'_>, &Loads<'_>),
         e: usize,
         [place, speed]: [&[f64]; 2],
+        flow: &[Vec<Flow>],
     ) -> Result<Own, Folded> {
         let n = place.len();
         let zeros = || vec![0.0; n * n];
@@ -116,7 +121,8 @@ impl Course<'_> {
             Own { mass: zeros(), damping: zeros(), stiffness: zeros(), open: vec![0.0; n] };
         let is_element = e < self.deck.cells.len();
         if self.step.large {
-            unbalanced(system, loads, &[], e, place, &mut own.stiffness, &mut own.open)?;
+            let (k, f) = (&mut own.stiffness, &mut own.open);
+            unbalanced(system, loads, of_element(flow, e), e, place, k, f)?;
         } else {
             if is_element {
                 let (element, warmth) = (system.element(e), system.warmth(e));
@@ -148,6 +154,7 @@ impl Course<'_> {
         let place = started(self.deck, self.past);
         let mut speed = self.past.speeds.clone();
         speed.resize(place.len(), 0.0);
+        let flow = self.past.flow.clone();
         let now = self.step.at(0.0);
         let mut system = self.system(&now, &place)?;
         system.free.settle();
@@ -156,7 +163,7 @@ impl Course<'_> {
             self.unknowns(e).into_iter().map(|u| all[u as usize]).collect()
         };
         let (mass, mut rhs) = system.assembled(job, |e, m, f| {
-            let own = self.own((&system, &loads), e, [&of(e, &place), &of(e, &speed)])?;
+            let own = self.own((&system, &loads), e, [&of(e, &place), &of(e, &speed)], &flow)?;
             m.copy_from_slice(&own.mass);
             f.copy_from_slice(&own.open);
             Ok(())
@@ -169,8 +176,9 @@ impl Course<'_> {
             direct(&mass, &rhs, &none, Method::Direct, TOLERANCE, job)?.x
         };
         let acceleration = system.free.expanded(&free);
-        let open = self.open((&system, &loads), [&place, &speed])?;
-        Ok(State { time: 0.0, place, speed, acceleration, open, forces: now.forces.clone() })
+        let open = self.open((&system, &loads), [&place, &speed], &flow)?;
+        let (time, forces) = (0.0, now.forces.clone());
+        Ok(State { time, place, speed, acceleration, open, forces, flow })
     }
 
     /// What is out of balance in every element and spring.
@@ -178,12 +186,13 @@ impl Course<'_> {
         &self,
         at: (&System<'_>, &Loads<'_>),
         [place, speed]: [&[f64]; 2],
+        flow: &[Vec<Flow>],
     ) -> Result<Vec<Vec<f64>>, LinearError> {
         let open = |e: usize| {
             let of = |all: &[f64]| -> Vec<f64> {
                 self.unknowns(e).into_iter().map(|u| all[u as usize]).collect()
             };
-            let own = self.own(at, e, [&of(place), &of(speed)]);
+            let own = self.own(at, e, [&of(place), &of(speed)], flow);
             let label = || self.deck.cells.get(e).map_or(0, |cell| cell.label);
             Ok(own.map_err(|Folded| LinearError::Folded(label()))?.open)
         };
@@ -214,7 +223,7 @@ impl Course<'_> {
                 unknowns.iter().zip(&place).map(|(&u, &p)| acceleration(u, p)).collect();
             let speeds: Vec<f64> =
                 unknowns.iter().zip(&accelerations).map(|(&u, &a)| speed(u, a)).collect();
-            let own = self.own((system, &loads), e, [&place, &speeds])?;
+            let own = self.own((system, &loads), e, [&place, &speeds], &from.flow)?;
             for (f, (open, old)) in f.iter_mut().zip(own.open.iter().zip(&from.open[e])) {
                 *f += (1.0 + alpha) * open - alpha * old;
             }
@@ -239,9 +248,11 @@ impl Course<'_> {
         let acceleration = each(&place, &acceleration);
         let speed = each(&acceleration, &speed);
         let system = self.system(&now, &place)?;
-        let open = self.open((&system, &loads), [&place, &speed])?;
+        let open = self.open((&system, &loads), [&place, &speed], &from.flow)?;
+        let flows = self.step.large && self.deck.materials.iter().any(|m| m.plastic.is_some());
+        let flow = if flows { ends(&system, &place, &from.flow)?.1 } else { from.flow.clone() };
         let forces = now.forces.clone();
-        Ok(Some(State { time, place, speed, acceleration, open, forces }))
+        Ok(Some(State { time, place, speed, acceleration, open, forces, flow }))
     }
 
     /// The end of an increment by its halves where that is exact enough, and the length of the next.

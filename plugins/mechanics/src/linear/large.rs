@@ -306,7 +306,8 @@ pub(super) fn ends(
     (0..system.deck.cells.len()).map(end).collect()
 }
 
-fn of_element(flow: &[Vec<Flow>], e: usize) -> &[Flow] {
+/// What has flowed at the points of an element.
+pub(super) fn of_element(flow: &[Vec<Flow>], e: usize) -> &[Flow] {
     flow.get(e).map_or(&[][..], Vec::as_slice)
 }
 

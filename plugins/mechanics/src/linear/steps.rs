@@ -284,7 +284,7 @@ impl Reader {
         if !heats {
             lacks(|m| m.elastic.is_some(), "*ELASTIC")?;
             let flows = match procedure {
-                Procedure::Static => state.large,
+                Procedure::Static | Procedure::Dynamic { .. } => state.large,
                 other => matches!(other, Procedure::Modes { .. }),
             };
             let is_known = |m: &Material| {
@@ -292,7 +292,7 @@ impl Reader {
             };
             let mut used = used.clone().map(|m| &self.deck.materials[m as usize]);
             if let Some(material) = used.find(|m| !is_known(m)) {
-                let why = "*PLASTIC is computed of what is isotropic, in *STATIC with NLGEOM";
+                let why = "*PLASTIC is computed of what is isotropic, with NLGEOM";
                 return Err(Fault::at(line, format!("material {}: {why}", material.name)));
             }
         }
