@@ -1,4 +1,5 @@
-//! Linear elastic decks of any solid elements: what engineers exchange beside members of concrete.
+//! Decks of any solid elements: what engineers exchange beside members of concrete. Linear elastic,
+//! but where displacements are large and metals flow.
 //!
 //! Decks of bricks, shells and bars whose concrete may crack go through [`crate::read`] and
 //! [`crate::deck`]. What those do not know is read here, computed at the end of each step, and

@@ -17,7 +17,7 @@ use crate::{
     write::Grid,
 };
 
-/// A linear elastic model and its steps.
+/// A model and its steps.
 #[derive(Debug, Clone, Default)]
 pub struct Deck {
     /// m.

@@ -278,8 +278,7 @@ impl Reader {
             self.faults.push(card.fault(what));
         }
         if let Some(last) = self.faults.last_mut() {
-            last.reason +=
-                "; static loads, frequencies, buckling and heat of linear elastic structures are";
+            last.reason += "; static loads, motion, vibrations, buckling and heat of elastic structures and metals are";
         }
     }
 
