@@ -395,7 +395,7 @@ fn whole_of(session: &Session, scene: &Scene, asked: bool) -> Result<Option<Whol
 enum Read {
     /// Bricks, shells and bars, as members have them.
     Members(Work),
-    /// Any solids, linear elastic.
+    /// Any solids, without members.
     Linear(Box<linear::Read>),
 }
 

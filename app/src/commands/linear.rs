@@ -1,4 +1,4 @@
-//! `intrados analyze` of a linear elastic deck of any solids.
+//! `intrados analyze` of a deck of any solids that is none of members.
 
 use std::fmt::Write as _;
 
@@ -69,7 +69,7 @@ pub(crate) fn run(
     ];
     if let Some((_, option)) = of_members.into_iter().find(|(given, _)| *given) {
         return Err(Failure::Usage(format!(
-            "{option}: this deck or mesh is linear elastic, and solved directly"
+            "{option}: this is no deck of members, to which that belongs"
         )));
     }
     let begin = cpu_seconds();
@@ -199,10 +199,8 @@ fn stresses(deck: &Deck, solved: &[Solved]) -> String {
 }
 
 fn table(report: &Report) -> String {
-    let mut text = format!(
-        "{}: {} nodes, {} elements, linear elastic\n",
-        report.deck, report.nodes, report.elements
-    );
+    let mut text =
+        format!("{}: {} nodes, {} elements\n", report.deck, report.nodes, report.elements);
     for step in &report.steps {
         if let Some(warmest) = step.max_temperature {
             let (name, unknowns) = (&step.name, step.unknowns);

@@ -4,7 +4,7 @@
 
 FOLDER holds .inp files, such as CalculiX' own (Debian: calculix-ccx-test, unpacked) or those of FreeCAD's tests (src/Mod/Fem/femtest/data/calculix).
 `ccx` is looked for in PATH, or named by CCX. What a deck prints is replaced by displacements of all nodes and stresses at all points at the end of every step,
-in global axes; by temperatures of all nodes in steps of heat; eigenvalues are those of the list that CalculiX writes. A deck agrees where the largest difference
+in global axes, in steps of vibrations at every frequency; by temperatures of all nodes in steps of heat; eigenvalues are those of the list that CalculiX writes. A deck agrees where the largest difference
 over the largest value is at most 1e-4, for displacements, for stresses and for temperatures, in every step, and where every eigenvalue differs by at most 1e-4 of
 itself. CalculiX writes seven digits. Where its stresses are at other points than ours only displacements are compared, and the table says so.
 """
@@ -20,10 +20,13 @@ import tempfile
 from pathlib import Path
 
 AGREES = 1e-4
-PRINTS = ("NODEPRINT", "ELPRINT", "NODEFILE", "ELFILE", "CONTACTFILE", "CONTACTPRINT", "SECTIONPRINT", "FACEPRINT", "NODEOUTPUT", "ELEMENTOUTPUT")
+PRINTS = ("CONTROLS", "NODEPRINT", "ELPRINT", "NODEFILE", "ELFILE", "CONTACTFILE", "CONTACTPRINT", "SECTIONPRINT", "FACEPRINT", "NODEOUTPUT", "ELEMENTOUTPUT")
 NODES, POINTS = "*NODE PRINT,NSET=ZZALL,GLOBAL=YES,FREQUENCY=100000", "*EL PRINT,ELSET=ZZALL,GLOBAL=YES,FREQUENCY=100000"
+# How far CalculiX goes on where displacements are large: of itself it is content with half a per cent of the forces.
+EXACT = "*CONTROLS,PARAMETERS=FIELD\n1.E-7,1.E-7,,,1.E-7,1.E-7,1.E-7"
 # What a step without these is asked for would be printed for every mode.
 NOTHING = ["*NODE PRINT,FREQUENCY=0", "*EL PRINT,FREQUENCY=0"]
+PROCEDURES = ("STATIC", "DYNAMIC", "FREQUENCY", "BUCKLE", "HEATTRANSFER", "MODALDYNAMIC", "STEADYSTATEDYNAMICS")
 KINDS = ("displacements", "stresses", "temperatures", "eigenvalues")
 
 
@@ -49,7 +52,8 @@ def asked(procedure, elements):
         return NOTHING
     if name == "HEATTRANSFER":
         return [NODES, "NT"]
-    return [NODES, "U", POINTS, "S"] if elements else [NODES, "U"]
+    cards = [NODES, "U", POINTS, "S"] if elements else [NODES, "U"]
+    return [card.replace("=100000", "=1") for card in cards] if name == "STEADYSTATEDYNAMICS" else cards
 
 
 def printing(text, nodes, elements):
@@ -64,7 +68,9 @@ def printing(text, nodes, elements):
                 lines.append(named("NSET", nodes))
                 if elements:
                     lines.append(named("ELSET", elements))
-            if name in ("STATIC", "FREQUENCY", "BUCKLE", "HEATTRANSFER"):
+            if name == "STEP" and "NLGEOM" in line.upper():
+                lines.append(EXACT)
+            if name in PROCEDURES:
                 procedure = line
             if name == "ENDSTEP":
                 lines += asked(procedure, elements)

@@ -2,6 +2,7 @@
 
 use std::{f64::consts::PI, fmt::Write as _, path::Path};
 
+use glam::DVec3;
 use intrados_stage::Job;
 
 use super::{parse, solve::Solved};
@@ -63,6 +64,229 @@ fn a_bar_vibrates_along_itself_as_waves_do() {
         let wave = (2 * n + 1) as f64 * 0.5 * PI;
         near(value / (wave * wave * modulus / 3.0), 1.0, 2e-4);
     }
+}
+
+/// The same bar, pulled at its end by 1 Pa from rest: when a wave has come back, both of its modes
+/// are at their farthest, (16/π²)(1 + 1/9) L/M; as long after that they are back. Pulled at a
+/// frequency with damping: Σ 2/(ρL)/(ω² − Ω² + iαΩ).
+#[test]
+fn a_bar_that_is_pulled_swings_as_its_modes_do() {
+    let modulus = E * 0.7 / (1.3 * 0.4);
+    let back = 2.0 * (3.0 / modulus).sqrt();
+    let bar =
+        bar(1.0, 8, 0.3, "C3D20") + "*BOUNDARY\nLOW,1\nALL,2,3\n*STEP\n*FREQUENCY\n2\n*END STEP\n";
+    let moved = format!(
+        "{bar}*STEP\n*MODAL DYNAMIC,DIRECT=NO\n.1,{back:?}\n*DLOAD\n8,P2,-1.\n*END STEP\n*STEP\n*MODAL DYNAMIC\n.01,{back:?}\n*END STEP\n"
+    );
+    let solved = solve(&moved);
+    let end = |of: &Solved| of.displacements.last().unwrap().x;
+    near(end(&solved[1]) * modulus / (16.0 / PI.powi(2) * (1.0 + 1.0 / 9.0)), 1.0, 1e-3);
+    near(end(&solved[2]) * modulus, 0.0, 1e-2);
+    let pace = 4.0 * PI;
+    let shaken = format!(
+        "{bar}*STEP\n*STEADY STATE DYNAMICS\n2.,2.\n*MODAL DAMPING,RAYLEIGH\n,,.7,0.\n*DLOAD\n8,P2,-1.\n*END STEP\n"
+    );
+    let solved = solve(&shaken);
+    let mut expected = [0.0; 2];
+    for n in [1.0, 3.0] {
+        let resists = [(n * 0.5 * PI).powi(2) * modulus / 3.0 - pace * pace, 0.7 * pace];
+        let share = 2.0 / 3.0 / (resists[0].powi(2) + resists[1].powi(2));
+        expected = [expected[0] + share * resists[0], expected[1] - share * resists[1]];
+    }
+    assert_eq!(solved.len(), 3);
+    (0..2).for_each(|i| near(end(&solved[1 + i]) / expected[i], 1.0, 2e-3));
+}
+
+/// The block on a spring of .3 N/m with a dashpot of .6 N·s/m beside it, pulled by 3 N from rest and
+/// shaken by them at 1 rad/s: ẍ + .2 ẋ + .1 x = 1.
+#[test]
+fn dashpots_slow_down_what_swings() {
+    let block = bar(1.0, 1, 1.0, "C3D20")
+        + "*NODE\n900,-1.,0.,0.\n*ELEMENT,TYPE=SPRINGA,ELSET=S\n900,900,1\n*SPRING,ELSET=S\n.3\n\
+           *ELEMENT,TYPE=DASHPOTA,ELSET=D\n901,900,1\n*DASHPOT,ELSET=D\n.6\n*BOUNDARY\nALL,2,3\n900,1,3\n";
+    let load = "*DLOAD\nALL,GRAV,1.,1.,0.,0.\n*END STEP\n";
+    let modes = "*STEP\n*FREQUENCY\n1\n*END STEP\n*STEP\n";
+    // s = .1, λ = .1, r = .3.
+    let swung = 10.0 * (1.0 - (-0.2f64).exp() * (0.6f64.cos() + 0.6f64.sin() / 3.0));
+    let moved = solve(&format!("{block}{modes}*MODAL DYNAMIC\n.5,2.\n{load}"));
+    near(moved[1].displacements[12].x / swung, 1.0, 2e-2);
+    let moved = solve(&format!("{block}*STEP\n*DYNAMIC,DIRECT,ALPHA=0.\n.01,2.\n{load}"));
+    near(moved[0].displacements[12].x / swung, 1.0, 2e-2);
+    let pace = 0.5 / PI;
+    let shaken = solve(&format!("{block}{modes}*STEADY STATE DYNAMICS\n{pace:?},{pace:?}\n{load}"));
+    // 1/(.1 − 1 + .2 i).
+    near(shaken[1].displacements[12].x, -0.9 / 0.85, 2e-2);
+    near(shaken[2].displacements[12].x, -0.2 / 0.85, 2e-2);
+}
+
+/// A spring that is soft from 1 m on, pulled along itself by 11 N.
+#[test]
+fn springs_follow_their_table_and_turn() {
+    let deck = "*NODE\n1,0,0,0\n2,1,0,0\n*ELEMENT,TYPE=SPRINGA,ELSET=S\n1,1,2\n\
+                *SPRING,ELSET=S,NONLINEAR\n0.,0.\n10.,1.\n100.,20.\n*BOUNDARY\n1,1,3\n2,2,3\n\
+                *STEP,NLGEOM\n*STATIC\n*CLOAD\n2,1,11.\n*END STEP\n";
+    near(solve(deck)[0].displacements[1].x, 1.0 + 19.0 / 90.0, 1e-9);
+}
+
+/// A block on a soft spring whose support follows a ramp moves with the ramp, and its modes by what
+/// the ramp's corner left: u = v (t − sin(ωt)/ω).
+#[test]
+fn what_stands_on_a_support_that_moves_is_carried_with_it() {
+    let block = bar(1.0, 1, 1.0, "C3D20")
+        + "*NODE\n900,-1.,0.,0.\n*ELEMENT,TYPE=SPRINGA,ELSET=S\n900,900,1\n*SPRING,ELSET=S\n.3\n\
+           *AMPLITUDE,NAME=A\n0.,0.,9.,9.\n*BOUNDARY\nALL,2,3\n900,1,3\n*STEP\n*FREQUENCY\n1\n*END STEP\n\
+           *STEP\n*MODAL DYNAMIC\n.01,2.\n*BOUNDARY,AMPLITUDE=A\n900,1,1,.5\n*END STEP\n";
+    // All of the block's mass, 3 kg, on .3 N/m, which is far softer than the block.
+    let pace = (0.3f64 / 3.0).sqrt();
+    let solved = solve(&block);
+    let far = solved[1].displacements[12].x;
+    near(far, 0.5 * (2.0 - (2.0 * pace).sin() / pace), 1e-3);
+}
+
+/// The bar that swings as its modes do, by the equations themselves: without dissipation the mean of
+/// its end over the time of a wave is where it is held at rest. And damped by its mass alone, thrown
+/// as one body, it slows down by e^(−αt).
+#[test]
+fn a_bar_swings_in_time_as_its_modes_do() {
+    let modulus = E * 0.7 / (1.3 * 0.4);
+    let back = 2.0 * (3.0 / modulus).sqrt();
+    let held = bar(1.0, 8, 0.3, "C3D20") + "*BOUNDARY\nLOW,1\nALL,2,3\n";
+    let load = "*DLOAD\n8,P2,-1.\n*END STEP\n";
+    let moved = |way: &str| {
+        let deck = format!("{held}*STEP\n*DYNAMIC,{way}\n{:?},{back:?}\n{load}", back / 80.0);
+        *solve(&deck)[0].displacements.last().unwrap()
+    };
+    // Of all modes together the end goes to 2 L/M and no farther; a kink rounded by increments.
+    near(moved("DIRECT,ALPHA=0.").x * modulus, 2.0, 0.05);
+    let modes = solve(&format!(
+        "{held}*STEP\n*FREQUENCY\n12\n*END STEP\n*STEP\n*MODAL DYNAMIC,DIRECT=NO\n.1,{back:?}\n{load}"
+    ));
+    near(moved("ALPHA=0.").x * modulus, modes[1].displacements.last().unwrap().x * modulus, 0.06);
+    let thrown = bar(1.0, 1, 1.0, "C3D20")
+        .replace("*DENSITY", "*DAMPING,ALPHA=2.,BETA=0.\n*DENSITY")
+        + "*BOUNDARY\nALL,2,3\n*STEP\n*DYNAMIC,DIRECT,ALPHA=0.\n.001,1.\n*DLOAD\nALL,GRAV,1.,1.,0.,0.\n*END STEP\n";
+    // ẍ + 2 ẋ = 1 from rest.
+    near(solve(&thrown)[0].displacements[0].x, 0.5 - 0.25 * (1.0 - (-2.0f64).exp()), 1e-5);
+}
+
+/// A pair of blocks that an equation binds goes on alone once the equation is removed.
+#[test]
+fn equations_hold_until_they_are_removed() {
+    let deck = bar(1.0, 1, 1.0, "C3D20")
+        + "*EQUATION\n2\n21,1,1.,22,1,-1.\n*BOUNDARY\nLOW,1,3\nALL,2,3\n*STEP\n*STATIC\n*CLOAD\n21,1,1.\n*END STEP\n\
+           *STEP\n*STATIC\n*EQUATION,REMOVE\n21,1\n*END STEP\n";
+    let solved = solve(&deck);
+    let apart = |k: usize| solved[k].displacements[12].x - solved[k].displacements[13].x;
+    near(apart(0), 0.0, 1e-12);
+    assert!(apart(1) > 1e-3, "{}", apart(1));
+}
+
+/// One element between planes of symmetry, with sides HIGH at x = 1.
+fn cube(steps: &str) -> String {
+    bar(1.0, 1, 1.0, "C3D20").replace("*DENSITY", "*EXPANSION\n1e-3\n*DENSITY")
+        + "*BOUNDARY\nLOW,1\n1,2,3\n2,3\n4,2\n11,2,3\n12,3\n5,3\n8,2\n14,2\n21,2,3\n22,3\n24,2\n25,3\n28,2\n"
+        + steps
+}
+
+/// Stretched by a fifth: E₁ = .22, E₂ = −ν E₁, σ = E E₁ λ₁/λ₂²; under a pressure on what has become
+/// smaller; warmed by what strains it by a tenth, without stress.
+#[test]
+fn cubes_stretch_far_as_green_and_kirchhoff_say() {
+    let pulled = cube("*STEP,NLGEOM\n*STATIC\n*BOUNDARY\nHIGH,1,1,.2\n*END STEP\n");
+    let solved = solve(&pulled);
+    let across = (1.0f64 - 2.0 * 0.3 * 0.22).sqrt();
+    for stress in solved[0].stresses.iter().flatten() {
+        near(stress[0], E * 0.22 * 1.2 / (across * across), 1e-7);
+        stress[1..].iter().for_each(|s| near(*s, 0.0, 1e-7));
+    }
+    near(solved[0].displacements[2].y, across - 1.0, 1e-9);
+    let pressed = cube("*STEP,NLGEOM\n*STATIC\n*DLOAD\n1,P2,-40.\n*END STEP\n");
+    let long = 1.0 + solve(&pressed)[0].displacements.last().unwrap().x;
+    let green = 0.5 * (long * long - 1.0);
+    near(40.0 * (1.0 - 0.6 * green), E * green * long, 1e-6);
+    let warm = cube("*STEP,NLGEOM\n*STATIC\n*TEMPERATURE\nALL,100.\n*END STEP\n");
+    let solved = solve(&warm);
+    near(solved[0].displacements[2].y, 0.1, 1e-9);
+    solved[0].stresses.iter().flatten().flatten().for_each(|s| near(*s, 0.0, 1e-7));
+}
+
+/// A cantilever under P L²/EI = 2: down by .49346 L and back by .16064 L (Mattiasson 1981); and back
+/// to where it was once the force is gone.
+#[test]
+fn a_cantilever_bends_as_the_elastica() {
+    let (length, width) = (20.0, 0.4);
+    let force = 2.0 * E * f64::powi(width, 4) / 12.0 / (length * length);
+    let [corner, middle] = [-force / 12.0, force / 3.0];
+    let loads: String = (321..=328)
+        .map(|n| format!("{n},3,{:?}\n", if n <= 324 { corner } else { middle }))
+        .collect();
+    let deck = bar(length, 16, width, "C3D20R")
+        + &format!(
+            "*BOUNDARY\nLOW,1,3\n*STEP,NLGEOM\n*STATIC\n*CLOAD\n{loads}*END STEP\n*STEP\n*STATIC\n*CLOAD,OP=NEW\n*END STEP\n"
+        );
+    let solved = solve(&deck);
+    let end = |of: &Solved| {
+        of.displacements[of.displacements.len() - 8..].iter().sum::<DVec3>() / 8.0 / length
+    };
+    near(end(&solved[0]).z, 0.49346, 2e-3);
+    near(end(&solved[0]).x, -0.16064, 2e-3);
+    near(end(&solved[1]).length(), 0.0, 1e-6);
+}
+
+/// A bar pulled beyond yield by forces, 1 % and a bit: bilinear as its table, then let go, which
+/// leaves what has flowed.
+#[test]
+fn bars_of_metal_keep_what_has_flowed() {
+    let stress = 2.2;
+    let deck = cube(&format!(
+        "*STEP,NLGEOM\n*STATIC\n*DLOAD\n1,P2,-{stress:?}\n*END STEP\n*STEP\n*STATIC\n*DLOAD,OP=NEW\n1,P2,0.\n*END STEP\n"
+    ))
+    .replace("*DENSITY", "*PLASTIC\n2.,0.\n4.,.1\n*DENSITY");
+    let solved = solve(&deck);
+    let flowed = (stress - 2.0) / 20.0;
+    near(solved[0].displacements.last().unwrap().x / (stress / E + flowed), 1.0, 2e-2);
+    near(solved[1].displacements.last().unwrap().x / flowed, 1.0, 2e-2);
+    solved[0].stresses.iter().flatten().for_each(|s| near(s[0], stress, 1e-6));
+    solved[1].stresses.iter().flatten().flatten().for_each(|s| near(*s, 0.0, 1e-6));
+    let why =
+        parse(deck.replace(",NLGEOM", "").as_bytes(), Path::new("deck.inp"), Units::MetreNewton);
+    assert!(why.unwrap_err().to_string().contains("material M: *PLASTIC is computed of what"));
+}
+
+/// A body that turns by a quarter of a circle has no stress.
+#[test]
+fn bodies_turn_far_without_stress() {
+    let deck = bar(1.0, 1, 1.0, "C3D20")
+        + "*NODE\n900,0.,0.,0.\n901,0.,0.,0.\n*RIGIDBODY,NSET=ALL,REFNODE=900,ROTNODE=901\n\
+           *BOUNDARY\n900,1,3\n901,1,3\n*STEP,NLGEOM\n*STATIC\n*BOUNDARY\n901,3,3,1.5707963267948966\n*END STEP\n";
+    let solved = solve(&deck);
+    // Of the corner at 1, 1, 1.
+    near(solved[0].displacements[14].distance(DVec3::new(-2.0, 0.0, 0.0)), 0.0, 1e-9);
+    solved[0].stresses.iter().flatten().flatten().for_each(|s| near(*s, 0.0, 1e-7));
+}
+
+/// Two B32R rolled up by a moment at their end: θ = M L/EI, and the end where the circle has it.
+#[test]
+fn beams_roll_up_under_a_moment() {
+    let deck = "*NODE\n10,0,0,0\n20,.2,0,0\n30,.4,0,0\n4,.6,0,0\n5,.8,0,0\n\
+                *ELEMENT,TYPE=B32R,ELSET=ALL\n3,10,20,30\n5,30,4,5\n*MATERIAL,NAME=M\n*ELASTIC\n210000.,0.\n\
+                *BEAM SECTION,MATERIAL=M,ELSET=ALL,SECTION=RECT\n.03,.015\n0.,0.,1.\n\
+                *BOUNDARY\n10,1,6\n*STEP,NLGEOM\n*STATIC\n*CLOAD\n5,6,MOMENT\n*END STEP\n";
+    let angle = 0.5f64;
+    let moment = angle * 210_000.0 * 0.03 * 0.015f64.powi(3) / 12.0 / 0.8;
+    let end = solve(&deck.replace("MOMENT", &format!("{moment:?}")))[0].displacements[4];
+    // Forces at the corners alone turn the end a little otherwise than stresses over it would.
+    near(end.y, 0.8 * (1.0 - angle.cos()) / angle, 1.5e-2);
+    near(end.x, 0.8 * (angle.sin() / angle - 1.0), 3e-3);
+}
+
+#[test]
+fn elements_with_bubbles_are_refused_where_displacements_are_large() {
+    let deck = "*NODE\n1,0,0,0\n2,1,0,0\n*ELEMENT,TYPE=B31,ELSET=ALL\n1,1,2\n\
+                *MATERIAL,NAME=M\n*ELASTIC\n200.,.3\n*BEAM SECTION,ELSET=ALL,MATERIAL=M,SECTION=RECT\n\
+                .1,.1\n*STEP,NLGEOM\n*STATIC\n*END STEP\n";
+    let error = parse(deck.as_bytes(), Path::new("deck.inp"), Units::MetreNewton).unwrap_err();
+    assert!(error.to_string().contains("deck.inp:5: element 1: C3D8I, B31 and S4"), "{error}");
 }
 
 /// Euler's column with a free end: P = π² E I/(4 L²); both planes alike, so that each factor comes

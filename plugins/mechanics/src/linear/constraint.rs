@@ -48,7 +48,10 @@ impl Bound {
             let Some(&(pivot, factor)) =
                 left.terms.iter().reduce(|a, b| if b.1.abs() > a.1.abs() { b } else { a })
             else {
-                let size = equation.value.abs().max(scale * 1e-9);
+                // What cancels is known to its own digits.
+                let part = |&(u, f): &(Unknown, f64)| (f * bound.of(u).constant).abs();
+                let known = equation.terms.iter().map(part).fold(equation.value.abs(), f64::max);
+                let size = known.max(scale * 1e-9);
                 if left.constant.abs() > 1e-9 * size {
                     return Err(equation);
                 }

@@ -7,6 +7,7 @@ use glam::DVec3;
 
 use super::{
     constraint::Equation,
+    curve::{Curve, Curved, terms},
     matter::all_numbers,
     mesh::name_of,
     model::Spring,
@@ -27,6 +28,8 @@ pub(super) enum Link {
     Ground,
     /// SPRING2: a component of one node to a component of another.
     Components,
+    /// DASHPOTA: along the line between two nodes.
+    Damper,
     /// DCOUP3D: the node of a `*DISTRIBUTING COUPLING`.
     Coupling,
 }
@@ -37,6 +40,7 @@ impl Link {
             "SPRINGA" => Some(Self::Between),
             "SPRING1" => Some(Self::Ground),
             "SPRING2" => Some(Self::Components),
+            "DASHPOTA" => Some(Self::Damper),
             "DCOUP3D" => Some(Self::Coupling),
             _ => None,
         }
@@ -44,44 +48,18 @@ impl Link {
 
     pub(super) fn nodes(self) -> usize {
         match self {
-            Self::Between | Self::Components => 2,
+            Self::Between | Self::Damper | Self::Components => 2,
             Self::Ground | Self::Coupling => 1,
         }
     }
-}
-
-/// Factors of the displacements of places whose sum is their mean rotation about an axis: with r
-/// the distance of each from the axis through their middle, (1/n) Σ (a × r)·(u − ū)/|r|² (Dhondt,
-/// *The Finite Element Method for Three-Dimensional Thermomechanical Applications*, sec. 3.6).
-/// Places on the axis say nothing; none where all lie on it.
-pub(super) fn mean_rotation(places: &[DVec3], axis: DVec3) -> Option<Vec<DVec3>> {
-    let middle = places.iter().sum::<DVec3>() / places.len() as f64;
-    let arms: Vec<DVec3> =
-        places.iter().map(|&p| (p - middle).reject_from_normalized(axis)).collect();
-    let reach = arms.iter().map(|r| r.length()).fold(0.0, f64::max);
-    let beside = |r: &&DVec3| r.length() > 1e-6 * reach;
-    let count = arms.iter().filter(beside).count() as f64;
-    if reach == 0.0 || count < 1.0 {
-        return None;
-    }
-    let turn = |r: &DVec3| axis.cross(*r) / (count * r.length_squared());
-    let own: Vec<DVec3> =
-        arms.iter().map(|r| if beside(&r) { turn(r) } else { DVec3::ZERO }).collect();
-    let mean = own.iter().sum::<DVec3>() / places.len() as f64;
-    Some(own.into_iter().map(|c| c - mean).collect())
-}
-
-/// Components of nodes with their factors.
-pub(super) fn terms(nodes: &[u32], factors: &[DVec3]) -> Vec<(u32, f64)> {
-    let three = |(&n, f): (&u32, &DVec3)| [(3 * n, f.x), (3 * n + 1, f.y), (3 * n + 2, f.z)];
-    nodes.iter().zip(factors).flat_map(three).filter(|t| t.1 != 0.0).collect()
 }
 
 impl Reader {
     pub(super) fn linked(&mut self, card: &Card<'_>) -> Result<(), Fault> {
         match plain(card).as_str() {
             "SPRING" => self.spring(card),
-            "MPC" => self.mean_rotations(card),
+            "DASHPOT" => self.dashpot(card),
+            "MPC" => self.multiple(card),
             "RIGIDBODY" => self.rigid_body(card),
             "DISTRIBUTINGCOUPLING" => self.coupling(card),
             _ => Ok(()),
@@ -89,15 +67,20 @@ impl Reader {
     }
 
     fn spring(&mut self, card: &Card<'_>) -> Result<(), Fault> {
-        card.only(&["ELSET"])?;
+        card.only(&["ELSET", "NONLINEAR"])?;
         let elements = self.named_elements(card)?;
         let rows: Vec<Row<'_>> = card.rows().collect();
         let first = rows.first().ok_or_else(|| card.fault("needed is: stiffness"))?;
+        let law = if card.get("NONLINEAR").is_some() { self.law(card)? } else { Vec::new() };
         for element in elements {
             let raw = self.raw[element as usize].clone();
-            let Kind::Link(link) = raw.kind else {
+            let Kind::Link(link @ (Link::Between | Link::Ground | Link::Components)) = raw.kind
+            else {
                 return Err(card.fault(format!("element {} is no spring", raw.label)));
             };
+            if !law.is_empty() && link != Link::Between {
+                return Err(card.fault("NONLINEAR is of SPRINGA"));
+            }
             let components = match link {
                 Link::Between => Vec::new(),
                 _ => first.fields().map(|w| direction(w, *first)).collect::<Result<_, _>>()?,
@@ -109,7 +92,50 @@ impl Reader {
             let terms = terms.ok_or_else(|| {
                 card.fault(format!("spring {} has no length, or no component", raw.label))
             })?;
-            self.deck.springs.push(Spring { terms, stiffness });
+            let ends: Option<[u32; 2]> =
+                raw.nodes.as_slice().try_into().ok().filter(|_| link == Link::Between);
+            let (law, drag) = (law.clone(), Vec::new());
+            self.deck.springs.push(Spring { terms, ends, stiffness, law, drag });
+            self.sprung.insert(element);
+        }
+        Ok(())
+    }
+
+    /// Force and elongation, line by line, to elongation and force.
+    fn law(&self, card: &Card<'_>) -> Result<Vec<(f64, f64)>, Fault> {
+        let mut law = Vec::new();
+        for row in card.rows() {
+            let [force, longer] = row.exactly("force, elongation")?;
+            let force = row.number(force)? * self.units.stress() * self.units.length().powi(2);
+            law.push((row.number(longer)? * self.units.length(), force));
+        }
+        let ascends = law.len() > 1 && law.is_sorted_by(|a, b| a.0 < b.0);
+        ascends.then_some(law).ok_or_else(|| card.fault("needed are two elongations, ascending"))
+    }
+
+    /// Force by speed, each with its frequency where it changes with that.
+    fn dashpot(&mut self, card: &Card<'_>) -> Result<(), Fault> {
+        card.only(&["ELSET"])?;
+        let mut drag = Vec::new();
+        for row in card.rows() {
+            let numbers = row.numbers("force by speed, frequency", 1..=2)?;
+            let frequency = numbers.get(1).copied().unwrap_or(0.0);
+            drag.push((frequency, numbers[0] * self.units.stress() * self.units.length()));
+        }
+        if drag.is_empty() || !drag.is_sorted_by(|a, b| a.0 < b.0) {
+            return Err(card.fault("needed are: force by speed, frequency, these ascending"));
+        }
+        for element in self.named_elements(card)? {
+            let raw = self.raw[element as usize].clone();
+            let found = match raw.kind {
+                Kind::Link(Link::Damper) => self.spring_terms(&raw.nodes, Link::Between, &[]),
+                _ => None,
+            };
+            let why =
+                || card.fault(format!("element {} is no dashpot, or has no length", raw.label));
+            let (terms, drag) = (found.ok_or_else(why)?, drag.clone());
+            let spring = Spring { terms, ends: None, stiffness: 0.0, law: Vec::new(), drag };
+            self.deck.springs.push(spring);
             self.sprung.insert(element);
         }
         Ok(())
@@ -123,7 +149,7 @@ impl Reader {
             (Link::Between, &[a, b]) => {
                 let along = self.deck.nodes[b as usize] - self.deck.nodes[a as usize];
                 let along = along.try_normalize()?;
-                Some(terms(nodes, &[-along, along]))
+                Some(terms(&[(nodes[0], -along), (nodes[1], along)]))
             }
             (Link::Ground, &[a]) => Some(signed(a, *by.first()?, 1.0).collect()),
             (Link::Components, &[a, b]) => {
@@ -134,18 +160,18 @@ impl Reader {
         }
     }
 
-    /// Every `MEANROT`: nodes, each for its three components, and the node whose place is the axis
-    /// and whose first component is the angle.
-    fn mean_rotations(&mut self, card: &Card<'_>) -> Result<(), Fault> {
+    /// `MEANROT`: nodes, each for its three components, and the node whose place is the axis and
+    /// whose first component is the angle. `PLANE` and `STRAIGHT`: nodes that stay in one.
+    fn multiple(&mut self, card: &Card<'_>) -> Result<(), Fault> {
         card.only(&[])?;
         let mut rows = card.rows().peekable();
         while let Some(row) = rows.next() {
             let mut words = row.fields().filter(|w| !w.is_empty());
             let kind = words.next().unwrap_or_default().to_ascii_uppercase();
-            if kind != "MEANROT" {
-                return Err(row.fault(format!("*MPC: {}: MEANROT is supported", quote(&kind))));
+            let mut nodes = Vec::new();
+            for word in words {
+                nodes.extend(self.some_nodes(word, row)?);
             }
-            let mut nodes: Vec<u32> = words.map(|w| self.node(w, row)).collect::<Result<_, _>>()?;
             while let Some(next) =
                 rows.next_if(|r| !r.text.starts_with(|c: char| c.is_ascii_alphabetic()))
             {
@@ -153,22 +179,44 @@ impl Reader {
                     nodes.push(self.node(word, next)?);
                 }
             }
-            let pilot = nodes.pop().ok_or_else(|| row.fault("MEANROT needs nodes"))?;
-            nodes.dedup();
-            let axis = self.deck.nodes[pilot as usize].try_normalize();
-            let axis = axis.ok_or_else(|| row.fault("the axis of MEANROT has no length"))?;
-            let places: Vec<DVec3> = nodes.iter().map(|&n| self.deck.nodes[n as usize]).collect();
-            let factors = mean_rotation(&places, axis)
-                .ok_or_else(|| row.fault("the nodes of MEANROT lie on one axis"))?;
-            // The pilot is an angle: its unit is not that of lengths.
-            let mut all = terms(&nodes, &factors);
-            all.push((3 * pilot, -1.0 / self.units.length()));
-            self.deck.equations.push(Equation { terms: all, value: 0.0, line: row.line });
+            let curve = match kind.as_str() {
+                "MEANROT" => {
+                    let pilot = nodes.pop().ok_or_else(|| row.fault("MEANROT needs nodes"))?;
+                    nodes.dedup();
+                    let axis = self.deck.nodes[pilot as usize].try_normalize();
+                    let axis =
+                        axis.ok_or_else(|| row.fault("the axis of MEANROT has no length"))?;
+                    // The pilot is an angle: its unit is not that of lengths.
+                    Curve::Turn { nodes, axis, angle: 3 * pilot, unit: self.units.length() }
+                }
+                "PLANE" => Curve::Plane(nodes),
+                "STRAIGHT" => Curve::Straight(nodes),
+                other => {
+                    let other = quote(other);
+                    return Err(row.fault(format!(
+                        "*MPC: {other}: MEANROT, PLANE and STRAIGHT are supported"
+                    )));
+                }
+            };
+            if !self.bound(curve, row.line) {
+                let why = "lie on one axis, on one line, or are one";
+                return Err(row.fault(format!("*MPC: the nodes of {kind} {why}")));
+            }
         }
         Ok(())
     }
 
-    /// u = u₀ + θ × (x − x₀) of every node of the set.
+    /// Adds a constraint that is another where displacements are large, unless its nodes are too
+    /// few to say anything.
+    pub(super) fn bound(&mut self, curve: Curve, line: u32) -> bool {
+        let curved = Curved { curve, first: self.deck.equations.len(), line };
+        let Some(equations) = curved.equations(&self.deck.nodes, |_| 0.0) else { return false };
+        self.deck.equations.extend(equations);
+        self.deck.curved.push(curved);
+        true
+    }
+
+    /// Every node of the set moves and turns with the reference.
     fn rigid_body(&mut self, card: &Card<'_>) -> Result<(), Fault> {
         card.only(&["NSET", "ELSET", "REF NODE", "ROT NODE"])?;
         if !card.rows().collect::<Vec<_>>().is_empty() {
@@ -191,24 +239,10 @@ impl Reader {
                 turning
             }
         };
-        let origin = self.deck.nodes[reference as usize];
         // Components of a node that turns are angles.
         let unit = if self.turning.contains_key(&reference) { 1.0 } else { self.units.length() };
-        for node in nodes.into_iter().filter(|&n| n != reference && n != turning) {
-            let arm = self.deck.nodes[node as usize] - origin;
-            for i in 0..3_u32 {
-                let along = DVec3::AXES[i as usize];
-                let mut terms = vec![(3 * node + i, 1.0), (3 * reference + i, -1.0)];
-                // (θ × r)·e = θ·(r × e).
-                let turned = arm.cross(along) / unit;
-                for (j, factor) in turned.to_array().into_iter().enumerate() {
-                    if factor != 0.0 {
-                        terms.push((3 * turning + j as u32, -factor));
-                    }
-                }
-                self.deck.equations.push(Equation { terms, value: 0.0, line: card.line });
-            }
-        }
+        let nodes = nodes.into_iter().filter(|&n| n != reference && n != turning).collect();
+        self.bound(Curve::Body { reference, turning, unit, nodes }, card.line);
         Ok(())
     }
 

@@ -6,6 +6,7 @@ use nalgebra::Matrix3;
 use super::{
     law::{Elastic, Expansion, Table},
     model::{Material, Orientation},
+    plastic::Hardening,
     read::{Kind, Reader, Section, plain},
     shape::Shape,
     thin::{Hollow, Profile, Thin},
@@ -33,7 +34,8 @@ impl Reader {
                 self.in_material = true;
                 Ok(())
             }
-            "ELASTIC" | "DENSITY" | "EXPANSION" | "CONDUCTIVITY" | "SPECIFICHEAT" => {
+            "ELASTIC" | "DENSITY" | "EXPANSION" | "CONDUCTIVITY" | "SPECIFICHEAT" | "DAMPING"
+            | "PLASTIC" => {
                 if !in_material {
                     return Err(card.fault(format!("*{} must stand under a *MATERIAL", card.name)));
                 }
@@ -81,6 +83,16 @@ impl Reader {
                     return Err(card.fault(format!("conductivity must be above 0, not {k}")));
                 }
                 material.conductivity = Some(table);
+            }
+            "PLASTIC" => material.plastic = Some(hardening(card, units.stress())?),
+            "DAMPING" => {
+                card.only(&["ALPHA", "BETA"])?;
+                for (to, name) in material.damping.iter_mut().zip(["ALPHA", "BETA"]) {
+                    let Some(word) = card.get(name) else { continue };
+                    let found = word.parse().ok().filter(|d: &f64| *d >= 0.0);
+                    let wrong = || card.fault(format!("{name} is a number that is not below 0"));
+                    *to = found.ok_or_else(wrong)?;
+                }
             }
             _ => {
                 card.only(&[])?;
@@ -407,10 +419,41 @@ fn elastic(card: &Card<'_>, kind: &str, numbers: &[f64], unit: f64) -> Result<El
             )));
         }
     };
-    let is_positive =
-        |law: [[f64; 6]; 6]| nalgebra::Matrix6::from_fn(|i, j| law[i][j]).cholesky().is_some();
-    let all = law.all().into_iter().all(is_positive);
-    all.then_some(law).ok_or_else(|| card.fault("*ELASTIC: this law is not positive definite"))
+    // What bears no shear is a fluid: whether a structure of it can move, its equations say.
+    let resists = |law: [[f64; 6]; 6]| {
+        if !law.iter().flatten().all(|value| value.is_finite()) {
+            return false;
+        }
+        let all = nalgebra::Matrix6::from_fn(|i, j| law[i][j]).symmetric_eigenvalues();
+        all.min() >= -1e-9 * all.max().abs()
+    };
+    let all = law.all().into_iter().all(resists);
+    all.then_some(law).ok_or_else(|| card.fault("*ELASTIC: this law gives way to some strain"))
+}
+
+/// True stress and plastic strain of each line.
+fn hardening(card: &Card<'_>, unit: f64) -> Result<Hardening, Fault> {
+    card.only(&["HARDENING"])?;
+    let kinematic = match card.word("HARDENING").as_deref() {
+        None | Some("ISOTROPIC") => false,
+        Some("KINEMATIC") => true,
+        Some(other) => {
+            let other = quote(other);
+            return Err(
+                card.fault(format!("HARDENING={other}: ISOTROPIC and KINEMATIC are supported"))
+            );
+        }
+    };
+    let mut table: Vec<(f64, f64)> = Vec::new();
+    for row in card.rows() {
+        let [stress, strain] = row.exactly("true stress, plastic strain")?;
+        table.push((row.number(strain)?, row.number(stress)? * unit));
+    }
+    let begins = table.first().is_some_and(|first| first.0 == 0.0 && first.1 > 0.0);
+    let grows = table.is_sorted_by(|a, b| a.0 < b.0 && a.1 <= b.1);
+    (begins && grows).then_some(Hardening { kinematic, table }).ok_or_else(|| {
+        card.fault("*PLASTIC begins at a plastic strain of 0 and a stress above 0; both grow")
+    })
 }
 
 /// E₁, E₂, E₃, ν₁₂, ν₁₃, ν₂₃, G₁₂, G₁₃, G₂₃ to the constants of [`Elastic::Orthotropic`].

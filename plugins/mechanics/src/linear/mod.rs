@@ -1,4 +1,5 @@
-//! Linear elastic decks of any solid elements: what engineers exchange beside members of concrete.
+//! Decks of any solid elements: what engineers exchange beside members of concrete. Linear elastic,
+//! but where displacements are large and metals flow.
 //!
 //! Decks of bricks, shells and bars whose concrete may crack go through [`crate::read`] and
 //! [`crate::deck`]. What those do not know is read here, computed at the end of each step, and
@@ -7,11 +8,11 @@
 //!
 //! | subject | what |
 //! |---|---|
-//! | elements | C3D4, C3D6, C3D8, C3D8I, C3D10, C3D15, C3D20, C3D20R; CPS, CPE and CAX of 3, 4, 6 and 8 nodes and 8R, as layers of solids; S3, S4, S6, S8, S8R and B31, B32, B32R where they meet smoothly; SPRINGA, SPRING1, SPRING2 |
-//! | materials | `*ELASTIC` (ISO, ORTHO, ANISO, ENGINEERING CONSTANTS), `*EXPANSION`, `*CONDUCTIVITY` (ISO, ORTHO), `*DENSITY`, `*SPECIFIC HEAT`, all by temperature; `*ORIENTATION` |
-//! | constraints | `*BOUNDARY`, `*EQUATION`, `*TRANSFORM`, `*TIE`, `*RIGID BODY`, `*MPC` (MEANROT), `*DISTRIBUTING COUPLING`, `*PRE-TENSION SECTION` |
+//! | elements | C3D4, C3D6, C3D8, C3D8I, C3D10, C3D15, C3D20, C3D20R; CPS, CPE and CAX of 3, 4, 6 and 8 nodes and 8R, as layers of solids; S3, S4, S6, S8, S8R and B31, B32, B32R where they meet smoothly; SPRINGA (also NONLINEAR), SPRING1, SPRING2, DASHPOTA |
+//! | materials | `*ELASTIC` (ISO, ORTHO, ANISO, ENGINEERING CONSTANTS), `*EXPANSION`, `*CONDUCTIVITY` (ISO, ORTHO), `*DENSITY`, `*SPECIFIC HEAT`, all by temperature; `*PLASTIC` (isotropic and kinematic, with NLGEOM); `*ORIENTATION` |
+//! | constraints | `*BOUNDARY`, `*EQUATION` (also REMOVE), `*TRANSFORM`, `*TIE`, `*RIGID BODY`, `*MPC` (MEANROT, PLANE, STRAIGHT), `*DISTRIBUTING COUPLING`, `*PRE-TENSION SECTION` |
 //! | loads | `*CLOAD`, `*DLOAD` (P, GRAV, CENTRIF), `*DSLOAD` (P), `*TEMPERATURE`, `*INITIAL CONDITIONS` (TEMPERATURE, STRESS, PLASTIC STRAIN), `*AMPLITUDE`; `*CFLUX`, `*DFLUX`, `*FILM`, `*RADIATE` |
-//! | steps | `*STATIC`, `*FREQUENCY`, `*BUCKLE`, `*HEAT TRANSFER` (steady, in time, FREQUENCY) without `NLGEOM`; `OP=MOD` and `OP=NEW` |
+//! | steps | `*STATIC`, `*FREQUENCY`, `*BUCKLE`, `*HEAT TRANSFER` (steady, in time, FREQUENCY), `*STATIC` with `NLGEOM` of all but C3D8I, B31, S4; `*DYNAMIC` with the same (implicit; `*DAMPING`), `*MODAL DYNAMIC` and harmonic `*STEADY STATE DYNAMICS` by the modes of the `*FREQUENCY` before, with `*MODAL DAMPING`; `OP=MOD` and `OP=NEW` |
 //!
 //! Everything else is refused in one line that names all of it.
 //!
@@ -19,24 +20,29 @@
 //! groups are made of, what holds them and what acts on them ([`Groups`]).
 
 mod constraint;
+mod curve;
+mod dynamic;
 mod element;
 mod flat;
 mod free;
 mod gmsh;
 mod groups;
 mod heat;
+mod large;
 mod law;
 mod link;
 mod matter;
 mod mesh;
 mod model;
 mod modes;
+mod plastic;
 mod read;
 mod shape;
 mod solve;
 mod steps;
 mod thin;
 mod tie;
+mod vibrate;
 mod warm;
 
 pub use gmsh::parse_mesh;

@@ -6,15 +6,18 @@ use glam::DVec3;
 
 use super::{
     constraint::Equation,
+    curve::Curved,
     law::{Elastic, Expansion, Table},
+    plastic::Hardening,
     shape::{Point, Shape},
 };
 use crate::{
+    model::interpolate,
     tensor::{self, Frame, Voigt},
     write::Grid,
 };
 
-/// A linear elastic model and its steps.
+/// A model and its steps.
 #[derive(Debug, Clone, Default)]
 pub struct Deck {
     /// m.
@@ -27,6 +30,10 @@ pub struct Deck {
     pub(super) springs: Vec<Spring>,
     /// What holds in every step: equations, ties, thickened elements.
     pub(super) equations: Vec<Equation>,
+    /// Steps from which on equations do not hold any more.
+    pub(super) until: HashMap<usize, u32>,
+    /// Those of the equations that are others where displacements are large.
+    pub(super) curved: Vec<Curved>,
     /// Nodes that thicken flat elements, and the node that each has its temperature from.
     pub(super) twins: HashMap<u32, u32>,
     /// Nodes whose displacement is given as the mean of others.
@@ -66,8 +73,48 @@ pub(super) struct Cell {
 #[derive(Debug, Clone)]
 pub(super) struct Spring {
     pub(super) terms: Vec<(u32, f64)>,
+    /// The two nodes that it lies between, if it turns with the line between them where
+    /// displacements are large.
+    pub(super) ends: Option<[u32; 2]>,
     /// N/m.
     pub(super) stiffness: f64,
+    /// Elongation, m, and force, N, where these are not in proportion.
+    pub(super) law: Vec<(f64, f64)>,
+    /// Of a dashpot: frequency, Hz, and N·s/m.
+    pub(super) drag: Vec<(f64, f64)>,
+}
+
+impl Spring {
+    /// Its force when it is so much longer, and by how much that grows.
+    pub(super) fn force(&self, longer: f64) -> [f64; 2] {
+        let i = self.law.partition_point(|p| p.0 <= longer);
+        match (i.checked_sub(1).and_then(|i| self.law.get(i)), self.law.get(i)) {
+            (Some(&(x, f)), Some(&(y, g))) => {
+                let slope = (g - f) / (y - x);
+                [f + slope * (longer - x), slope]
+            }
+            (Some(&(_, f)), None) | (None, Some(&(_, f))) => [f, 0.0],
+            (None, None) => [self.stiffness * longer, self.stiffness],
+        }
+    }
+
+    /// Force by speed at a frequency, Hz; none of a spring.
+    pub(super) fn drag(&self, frequency: f64) -> f64 {
+        interpolate(&self.drag, frequency).unwrap_or(0.0)
+    }
+
+    /// Adds its stiffness, row by row.
+    pub(super) fn resist(&self, k: &mut [f64]) {
+        self.outer(self.stiffness, k);
+    }
+
+    /// Adds a matrix of its terms, row by row.
+    pub(super) fn outer(&self, factor: f64, k: &mut [f64]) {
+        for (row, a) in k.chunks_mut(self.terms.len()).zip(&self.terms) {
+            let force = factor * a.1;
+            row.iter_mut().zip(&self.terms).for_each(|(k, b)| *k += force * b.1);
+        }
+    }
 }
 
 /// What a material is; a step asks for what it needs.
@@ -76,12 +123,15 @@ pub(super) struct Material {
     pub(super) name: String,
     pub(super) elastic: Option<Elastic>,
     pub(super) expansion: Option<Expansion>,
+    pub(super) plastic: Option<Hardening>,
     /// kg/m³.
     pub(super) density: Option<Table<1>>,
     /// Along its own axes, W/(m·K).
     pub(super) conductivity: Option<Table<3>>,
     /// J/(kg·K).
     pub(super) specific_heat: Option<Table<1>>,
+    /// Rayleigh's: so many times the mass, 1/s, and so many times the stiffness, s.
+    pub(super) damping: [f64; 2],
 }
 
 /// The axes of a material.
@@ -163,6 +213,37 @@ pub(super) enum Procedure {
     },
     /// The smallest factors of the loads at which the structure buckles.
     Buckling { count: usize },
+    /// Motion over time by the modes of the last step of them: in increments of so many seconds, or
+    /// from corner to corner of what acts.
+    Motion { increment: Option<f64>, duration: f64 },
+    /// Motion over time by the equations themselves, in increments of so many seconds or shorter
+    /// ones, with Hilber's, Hughes' and Taylor's α.
+    Dynamic { increment: f64, fixed: bool, duration: f64, alpha: f64 },
+    /// What stays of vibrations at frequencies between these, Hz: so many of them between two
+    /// modes, the nearer to these the larger the bias.
+    Harmonic { range: [f64; 2], points: u32, bias: f64 },
+}
+
+/// What takes energy from a mode.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(super) enum Damping {
+    #[default]
+    None,
+    /// Rayleigh's: so many times the mass, 1/s, and so many times the stiffness, s.
+    Rayleigh { mass: f64, stiffness: f64 },
+    /// Over critical damping, by mode.
+    Shares(Vec<f64>),
+}
+
+/// What follows one course over time or frequency.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Course {
+    /// Time, s, or frequency, Hz, and factor; none: the factor is one.
+    pub(super) points: Vec<(f64, f64)>,
+    /// Forces where the factor is one, on what does not move where it is supported.
+    pub(super) loads: Step,
+    /// Supports where the factor is one, and no forces.
+    pub(super) base: Step,
 }
 
 /// A way of heating.
@@ -190,12 +271,19 @@ pub(super) struct Step {
     /// From 1.
     pub(super) number: u32,
     pub(super) procedure: Procedure,
+    /// Whether equilibrium is where everything has gone to.
+    pub(super) large: bool,
     /// Components (in the node's own axes) and values, m.
     pub(super) held: BTreeMap<(u32, u8), f64>,
     /// Components that stay where the step before has left them.
     pub(super) kept: BTreeSet<(u32, u8)>,
     /// N.
     pub(super) forces: BTreeMap<(u32, u8), f64>,
+    /// Forces a quarter of a period before them, N.
+    pub(super) early: BTreeMap<(u32, u8), f64>,
+    /// What acts over time or frequency, beside all that.
+    pub(super) courses: Vec<Course>,
+    pub(super) damping: Damping,
     /// Pa, by element and face.
     pub(super) pressures: BTreeMap<(u32, u8), f64>,
     pub(super) pulls: Vec<(u32, Pull)>,
@@ -206,6 +294,26 @@ pub(super) struct Step {
     pub(super) heating: BTreeMap<Heated, [f64; 2]>,
     /// Elements that are made of another material than their own.
     pub(super) materials: BTreeMap<u32, u32>,
+}
+
+impl Step {
+    /// The step at a time of it: everything times what its course is then.
+    pub(super) fn at(&self, time: f64) -> Self {
+        let mut now = Self { courses: Vec::new(), ..self.clone() };
+        for course in &self.courses {
+            let factor = interpolate(&course.points, time).unwrap_or(1.0);
+            let add = |to: &mut BTreeMap<(u32, u8), f64>, from: &BTreeMap<(u32, u8), f64>| {
+                for (&key, value) in from {
+                    *to.entry(key).or_default() += factor * value;
+                }
+            };
+            add(&mut now.held, &course.base.held);
+            add(&mut now.forces, &course.loads.forces);
+            add(&mut now.pressures, &course.loads.pressures);
+            now.pulls.extend(course.loads.pulls.iter().map(|&(e, pull)| (e, pull.times(factor))));
+        }
+        now
+    }
 }
 
 impl Deck {

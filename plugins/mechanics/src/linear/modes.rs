@@ -39,14 +39,21 @@ impl From<SolveError> for Failed {
     }
 }
 
-/// The smallest positive eigenvalues, ascending; fewer where there are not as many. Where K is
-/// singular, those of K + s G, less s.
+/// An eigenvalue and its vector, of which G makes one: φᵀ G φ = 1.
+#[derive(Debug, Clone)]
+pub(super) struct Mode {
+    pub(super) value: f64,
+    pub(super) shape: Vec<f64>,
+}
+
+/// The modes of the smallest positive eigenvalues, ascending; fewer where there are not as many.
+/// Where K is singular, those of K + s G, less s.
 pub(super) fn smallest(
     mut k: BlockMatrix<1>,
     g: &BlockMatrix<1>,
     count: usize,
     job: &Job,
-) -> Result<Vec<f64>, Failed> {
+) -> Result<Vec<Mode>, Failed> {
     match Krylov::new(&k, g, job) {
         Ok(krylov) => krylov.smallest(count, job),
         Err(Failed::Solve(
@@ -57,7 +64,7 @@ pub(super) fn smallest(
             let shift = SHIFT * k.trace() / g.trace();
             k.add(shift, g);
             let found = Krylov::new(&k, g, job)?.smallest(count, job)?;
-            Ok(found.into_iter().map(|l| l - shift).collect())
+            Ok(found.into_iter().map(|m| Mode { value: m.value - shift, ..m }).collect())
         }
         Err(other) => Err(other),
     }
@@ -86,7 +93,7 @@ impl<'a> Krylov<'a> {
         Ok(Self { k, g, solver, basis: Vec::new(), stiff: Vec::new(), pushed: Vec::new() })
     }
 
-    fn smallest(mut self, count: usize, job: &Job) -> Result<Vec<f64>, Failed> {
+    fn smallest(mut self, count: usize, job: &Job) -> Result<Vec<Mode>, Failed> {
         let unknowns = self.k.unknowns();
         let mut seeds = 0;
         let mut last: Vec<f64> = Vec::new();
@@ -122,13 +129,11 @@ impl<'a> Krylov<'a> {
                 && found[..=count].iter().zip(&last).all(near)
                 && self.is_whole(&found, count, job)
             {
-                return Ok(found[..count].to_vec());
+                return Ok(self.modes(count));
             }
             last = found;
         }
-        let mut found = self.ritz();
-        found.truncate(count);
-        Ok(found)
+        Ok(self.modes(count))
     }
 
     fn solved(&mut self, rhs: &[f64], job: &Job) -> Result<Vec<f64>, Failed> {
@@ -161,17 +166,32 @@ impl<'a> Krylov<'a> {
         self.stiff.push(kv);
     }
 
-    /// λ of the basis, those above 0, ascending (Rayleigh and Ritz).
-    fn ritz(&self) -> Vec<f64> {
+    /// G as the basis sees it.
+    fn projected(&self) -> DMatrix<f64> {
         let n = self.basis.len();
         let matrix = DMatrix::from_fn(n, n, |i, j| dot(&self.basis[i], &self.pushed[j]));
-        let symmetric = 0.5 * (&matrix + matrix.transpose());
-        let all = symmetric.symmetric_eigenvalues();
-        let largest = all.iter().fold(0.0, |a: f64, b| a.max(*b));
-        let mut found: Vec<f64> =
-            all.iter().filter(|m| **m > 1e-12 * largest).map(|m| 1.0 / m).collect();
-        found.sort_unstable_by(f64::total_cmp);
-        found
+        0.5 * (&matrix + matrix.transpose())
+    }
+
+    /// λ of the basis, those above 0, ascending (Rayleigh and Ritz).
+    fn ritz(&self) -> Vec<f64> {
+        let all = self.projected().symmetric_eigenvalues();
+        above_nothing(all.as_slice()).into_iter().map(|(value, _)| value).collect()
+    }
+
+    /// The first of them with their vectors.
+    fn modes(&self, count: usize) -> Vec<Mode> {
+        let eigen = self.projected().symmetric_eigen();
+        let mode = |(value, at): (f64, usize)| {
+            let mut shape = vec![0.0; self.k.unknowns()];
+            // Of unit length in the scalar product of K, so that G makes 1/λ of it.
+            for (share, b) in eigen.eigenvectors.column(at).iter().zip(&self.basis) {
+                let share = share * value.sqrt();
+                shape.iter_mut().zip(b).for_each(|(s, b)| *s += share * b);
+            }
+            Mode { value, shape }
+        };
+        above_nothing(eigen.eigenvalues.as_slice()).into_iter().take(count).map(mode).collect()
     }
 
     /// Whether K − σ G has as many negative eigenvalues as were found below σ.
@@ -191,6 +211,15 @@ impl<'a> Krylov<'a> {
     }
 }
 
+/// λ of 1/λ, those above 0, ascending, each with its place.
+fn above_nothing(inverse: &[f64]) -> Vec<(f64, usize)> {
+    let largest = inverse.iter().fold(0.0, |a: f64, b| a.max(*b));
+    let places = inverse.iter().enumerate().filter(|(_, m)| **m > 1e-12 * largest);
+    let mut found: Vec<(f64, usize)> = places.map(|(at, m)| (1.0 / m, at)).collect();
+    found.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+    found
+}
+
 /// A vector without symmetries: Weyl's sequence of the golden ratio.
 fn start(unknowns: usize, number: usize) -> Vec<f64> {
     let golden = 0.618_033_988_749_894_9;
@@ -198,12 +227,12 @@ fn start(unknowns: usize, number: usize) -> Vec<f64> {
     (1..=unknowns).map(value).collect()
 }
 
-fn times(matrix: &BlockMatrix<1>, v: &[f64]) -> Vec<f64> {
+pub(super) fn times(matrix: &BlockMatrix<1>, v: &[f64]) -> Vec<f64> {
     let mut result = vec![0.0; v.len()];
     matrix.multiply(v, &mut result);
     result
 }
 
-fn dot(a: &[f64], b: &[f64]) -> f64 {
+pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }

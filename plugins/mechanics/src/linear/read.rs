@@ -24,13 +24,16 @@ use crate::read::{
 
 /// Cards that are read, without their spaces.
 const KNOWN: &str = "NODE ELEMENT NSET ELSET SURFACE MATERIAL ELASTIC DENSITY EXPANSION \
-    CONDUCTIVITY SPECIFICHEAT SOLIDSECTION SHELLSECTION BEAMSECTION \
+    CONDUCTIVITY SPECIFICHEAT DAMPING PLASTIC SOLIDSECTION SHELLSECTION BEAMSECTION \
     BEAMGENERALSECTION NODALTHICKNESS MEMBRANE ORIENTATION AMPLITUDE TRANSFORM EQUATION TIE \
-    SPRING MPC RIGIDBODY DISTRIBUTINGCOUPLING PRE-TENSIONSECTION PHYSICALCONSTANTS \
-    INITIALCONDITIONS BOUNDARY STEP STATIC FREQUENCY BUCKLE HEATTRANSFER CLOAD DLOAD DSLOAD \
+    SPRING DASHPOT MPC RIGIDBODY DISTRIBUTINGCOUPLING PRE-TENSIONSECTION PHYSICALCONSTANTS \
+    INITIALCONDITIONS BOUNDARY STEP STATIC DYNAMIC FREQUENCY BUCKLE HEATTRANSFER MODALDYNAMIC \
+    STEADYSTATEDYNAMICS MODALDAMPING CLOAD DLOAD DSLOAD \
     TEMPERATURE CFLUX DFLUX FILM RADIATE CHANGESOLIDSECTION ENDSTEP";
 /// Cards that only concern what is printed, beside those of every deck.
 const OUTPUT: [&str; 2] = ["FACEPRINT", "TIMEPOINTS"];
+/// What only says how CalculiX iterates.
+const CONTROLS: &str = "CONTROLS";
 /// Cards that only say how contact would behave: without contact they say nothing.
 const CONTACT: [&str; 3] = ["SURFACEINTERACTION", "SURFACEBEHAVIOR", "FRICTION"];
 
@@ -42,6 +45,7 @@ pub fn concerns(bytes: &[u8]) -> bool {
     cards.iter().any(|card| {
         !abaqus::knows(card)
             || card.get("ORIENTATION").is_some()
+            || (card.is("STEP") && card.word("NLGEOM").is_some_and(|word| word != "NO"))
             || (card.is("ELEMENT")
                 && !abaqus::knows_element(&card.word("TYPE").unwrap_or_default()))
     })
@@ -182,6 +186,10 @@ pub(super) struct Reader {
     /// W/(m²·K⁴).
     pub(super) boltzmann: Option<f64>,
     pub(super) tied: bool,
+    /// Places of equations by the component that comes first in them.
+    pub(super) equations: BTreeMap<(u32, u8), usize>,
+    /// Steps that end equations, all of them or those that a component comes first in.
+    pub(super) ended: Vec<(u32, Option<(u32, u8)>)>,
     pub(super) in_material: bool,
     faults: Vec<Fault>,
 }
@@ -205,6 +213,8 @@ impl Reader {
             rings: HashMap::new(),
             boltzmann: None,
             tied: false,
+            equations: BTreeMap::new(),
+            ended: Vec::new(),
             in_material: false,
             faults: Vec::new(),
         }
@@ -216,6 +226,12 @@ impl Reader {
 
     /// What was made on the way has temperatures too.
     fn finished(mut self) -> Deck {
+        for (step, first) in self.ended {
+            let concerns = |at: &(u32, u8)| first.is_none_or(|first| first == *at);
+            for (_, &place) in self.equations.iter().filter(|e| concerns(e.0)) {
+                self.deck.until.entry(place).or_insert(step);
+            }
+        }
         let count = self.deck.nodes.len();
         let mut cold = std::mem::take(&mut self.deck.cold);
         cold.resize(count, 0.0);
@@ -250,7 +266,10 @@ impl Reader {
             } else {
                 let idle = CONTACT.contains(&name.as_str()) && !has_contact;
                 let known = KNOWN.split_ascii_whitespace().any(|known| known == name);
-                let idle = idle || OUTPUT.contains(&name.as_str()) || abaqus::is_output(card);
+                let idle = idle
+                    || name == CONTROLS
+                    || OUTPUT.contains(&name.as_str())
+                    || abaqus::is_output(card);
                 if known || idle || !seen.insert(name) {
                     continue;
                 }
@@ -259,8 +278,7 @@ impl Reader {
             self.faults.push(card.fault(what));
         }
         if let Some(last) = self.faults.last_mut() {
-            last.reason +=
-                "; static loads, frequencies, buckling and heat of linear elastic structures are";
+            last.reason += "; static loads, motion, vibrations, buckling and heat of elastic structures and metals are";
         }
     }
 

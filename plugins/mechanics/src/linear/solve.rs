@@ -1,17 +1,20 @@
 //! Steps to displacements and stresses: T ᵀ K T q = Tᵀ (f − K c), factorised.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 use glam::DVec3;
 use intrados_stage::{Cancelled, Job};
 
 use super::{
     constraint::{Bound, Equation, Sum},
+    dynamic,
     element::{Element, Folded, Warmth},
     free::Free,
-    heat,
-    model::{Deck, Procedure, Pull, Step},
-    modes,
+    heat, large,
+    model::{Deck, Procedure, Pull, Spring, Step},
+    modes::{self, Mode},
+    plastic::Flow,
+    vibrate,
 };
 use crate::{
     sparse::{BlockMatrix, Constraints, Method, SolveError, solve},
@@ -94,6 +97,20 @@ pub enum LinearError {
         /// Name of the step.
         step: String,
     },
+    /// Motion by modes of what was held otherwise.
+    #[error("{step}: supports and equations are not those of the step of *FREQUENCY before it")]
+    OtherModes {
+        /// Name of the step.
+        step: String,
+    },
+    /// Vibrations that grow without end.
+    #[error("{step}: without *MODAL DAMPING there is no end to vibrations at {frequency} Hz")]
+    Resonance {
+        /// Name of the step.
+        step: String,
+        /// Hz.
+        frequency: f64,
+    },
     /// Temperatures or modes that do not settle.
     #[error("{step}: {what} do not converge")]
     NotConverged {
@@ -118,48 +135,88 @@ const TOLERANCE: f64 = 1e-6;
 #[derive(Default)]
 pub(super) struct Past {
     /// Of every unknown; empty before the first step.
-    displacements: Vec<f64>,
-    stresses: Vec<Vec<Voigt>>,
+    pub(super) displacements: Vec<f64>,
+    /// The same by the second; empty after a step that is none of motion.
+    pub(super) speeds: Vec<f64>,
+    pub(super) stresses: Vec<Vec<Voigt>>,
+    /// What has flowed at every point; empty: nothing.
+    pub(super) flow: Vec<Vec<Flow>>,
+    /// Whether they are of equilibrium where everything has gone to.
+    pub(super) large: bool,
     /// Of every node.
     pub(super) temperatures: Vec<f64>,
+    pub(super) modes: Option<vibrate::Modes>,
+}
+
+impl Past {
+    /// Before the first step.
+    pub(super) fn of(deck: &Deck) -> Self {
+        Self { temperatures: deck.cold.clone(), ..Self::default() }
+    }
 }
 
 impl Deck {
-    /// Computes every step.
+    /// Computes every step: what it ends in; where it asks for vibrations, the real and the imaginary
+    /// part at every frequency.
     ///
     /// # Errors
     /// [`LinearError`].
     pub fn solve(&self, job: &Job) -> Result<Vec<Solved>, LinearError> {
-        let mut past = Past { temperatures: self.cold.clone(), ..Past::default() };
+        let mut past = Past::of(self);
         let share = self.steps.len() as f64;
-        let solved = self.steps.iter().enumerate().map(|(i, step)| {
+        let mut solved = Vec::new();
+        for (i, step) in self.steps.iter().enumerate() {
             job.step(i, self.steps.len())?;
-            self.step(step, &mut past, &job.part(i as f64 / share, (i + 1) as f64 / share))
-        });
-        solved.collect()
+            if !matches!(step.procedure, Procedure::Dynamic { .. }) {
+                past.speeds.clear();
+            }
+            let part = job.part(i as f64 / share, (i + 1) as f64 / share);
+            match step.procedure {
+                Procedure::Motion { .. } | Procedure::Harmonic { .. } => {
+                    solved.extend(vibrate::solve(self, step, &mut past, &part)?);
+                }
+                _ => solved.push(self.step(step, &mut past, &part)?),
+            }
+        }
+        Ok(solved)
     }
 
     fn step(&self, step: &Step, past: &mut Past, job: &Job) -> Result<Solved, LinearError> {
         match step.procedure {
-            Procedure::Static => System::new(self, step, past)?.solve(past, job),
             Procedure::Modes { count, heat: true, .. } => heat::modes(self, step, count, job),
             Procedure::Modes { count, stressed, .. } => {
-                let system = System::new(self, step, past)?;
-                system.modes(count, if stressed { &past.stresses } else { &[] }, job)
+                let (system, stiffness) = match stressed {
+                    true if past.large => large::tangent(self, step, past, job)?,
+                    _ => {
+                        let system = System::new(self, step, past)?;
+                        let stresses = if stressed { past.stresses.as_slice() } else { &[] };
+                        let stiffness = system.stiff_under(stresses, job)?;
+                        (system, stiffness)
+                    }
+                };
+                let (mass, _) = system.mass(job)?;
+                let all = system.smallest(stiffness, &mass, count, job)?;
+                let solved = system.eigenvalues(&all);
+                let order = system.free.order().to_vec();
+                past.modes = Some(vibrate::Modes { order, all, state: Vec::new() });
+                Ok(solved)
             }
             Procedure::Buckling { count } => {
                 let system = System::new(self, step, past)?;
-                system.buckling(count, job)
+                Ok(system.eigenvalues(&system.buckling(count, job)?))
             }
             Procedure::Heat { steady, first, duration } => {
                 let time = (!steady).then_some([first, duration]);
                 heat::solve(self, step, time, &mut past.temperatures, job)
             }
+            Procedure::Dynamic { .. } => dynamic::solve(self, step, past, job),
+            _ if step.large => large::solve(self, step, past, job),
+            _ => System::new(self, step, past)?.solve(past, job),
         }
     }
 
-    /// What is held in a step, as equations.
-    fn held(&self, step: &Step, past: &Past) -> Vec<Equation> {
+    /// What is held in a step, then what binds the rest.
+    pub(super) fn constraints(&self, step: &Step, past: &Past) -> Vec<Equation> {
         let equation = |(node, component), value| Equation {
             terms: self.component(node, component),
             value,
@@ -171,45 +228,60 @@ impl Deck {
             let terms = self.component(node, component);
             equation((node, component), terms.iter().filter_map(place).sum())
         });
-        held.chain(kept).collect()
+        let later = self.later.iter().filter(|l| l.0 <= step.number).map(|l| &l.1);
+        let own = self.equations.iter().enumerate().map(|(i, equation)| {
+            // What holds no more says nothing.
+            let is_over = self.until.get(&i).is_some_and(|until| *until <= step.number);
+            let nothing = || Equation { terms: Vec::new(), value: 0.0, line: equation.line };
+            if is_over { nothing() } else { equation.clone() }
+        });
+        held.chain(kept).chain(own).chain(later.cloned()).collect()
     }
 }
 
 /// A step and its constraints.
-struct System<'a> {
-    deck: &'a Deck,
-    step: &'a Step,
+pub(super) struct System<'a> {
+    pub(super) deck: &'a Deck,
+    pub(super) step: &'a Step,
     /// Temperature of every node.
     warm: Vec<f64>,
     /// What is solved for, by elements and after them by springs.
-    free: Free<'a>,
+    pub(super) free: Free<'a>,
+    /// Whether springs turn.
+    large: bool,
 }
 
 impl<'a> System<'a> {
-    fn new(deck: &'a Deck, step: &'a Step, past: &Past) -> Result<Self, LinearError> {
-        let held = deck.held(step, past);
-        // Supports first: equations then bind what is left.
-        let later = deck.later.iter().filter(|l| l.0 <= step.number).map(|l| &l.1);
-        let bound = Bound::new(held.iter().chain(&deck.equations).chain(later))
-            .map_err(|e| LinearError::Contradiction { step: step.name.clone(), line: e.line })?;
-        let sums: Vec<Sum> = (0..3 * deck.nodes.len() as u32).map(|u| bound.of(u)).collect();
+    pub(super) fn new(deck: &'a Deck, step: &'a Step, past: &Past) -> Result<Self, LinearError> {
+        let sums = sums(deck, step, &deck.constraints(step, past))?;
+        Ok(Self::of(deck, step, past, sums, false))
+    }
+
+    /// From what every unknown is by the free ones, with springs that turn or not.
+    pub(super) fn of(
+        deck: &'a Deck,
+        step: &'a Step,
+        past: &Past,
+        sums: Vec<Sum>,
+        large: bool,
+    ) -> Self {
         let warm = if step.warm.is_empty() { &past.temperatures } else { &step.warm };
-        let elements = (0..deck.cells.len() + deck.springs.len()).map(|e| unknowns(deck, e));
+        let elements = (0..deck.cells.len() + deck.springs.len()).map(|e| unknowns(deck, e, large));
         let free = Free::new(deck, sums, elements, |unknown| unknown / 3);
-        Ok(Self { deck, step, warm: warm.clone(), free })
+        Self { deck, step, warm: warm.clone(), free, large }
     }
 
     /// Temperatures of the nodes of an element.
-    fn warmth(&self, e: usize) -> Warmth {
+    pub(super) fn warmth(&self, e: usize) -> Warmth {
         let of = |all: &[f64]| self.deck.cells[e].nodes.iter().map(|&n| all[n as usize]).collect();
         Warmth { now: of(&self.warm), cold: of(&self.deck.cold) }
     }
 
-    fn initial(&self, e: usize) -> impl Fn(usize) -> Voigt + '_ {
+    pub(super) fn initial(&self, e: usize) -> impl Fn(usize) -> Voigt + '_ {
         move |p| self.deck.stress.get(&(e as u32, p as u32)).copied().unwrap_or(tensor::ZERO)
     }
 
-    fn element(&self, e: usize) -> Element<'a> {
+    pub(super) fn element(&self, e: usize) -> Element<'a> {
         Element::new(self.deck, self.step, e)
     }
 
@@ -223,49 +295,97 @@ impl<'a> System<'a> {
                 loads.add(e, &element, &warmth, f)
             }
             Some(spring) => {
-                let spring = &self.deck.springs[spring];
-                for (row, a) in k.chunks_mut(spring.terms.len()).zip(&spring.terms) {
-                    let force = spring.stiffness * a.1;
-                    row.iter_mut().zip(&spring.terms).for_each(|(k, b)| *k += force * b.1);
-                }
+                self.deck.springs[spring].resist(k);
                 Ok(())
             }
         })
     }
 
+    /// Forces of what acts on elements and nodes, without those of warmth and of stress from the
+    /// beginning.
+    pub(super) fn forces(&self, job: &Job) -> Result<Vec<f64>, LinearError> {
+        let loads = self.distributed()?;
+        let (_, mut rhs) = self.assembled(job, |e, _, f| {
+            if e < self.deck.cells.len() {
+                loads.add(e, &self.element(e), &self.warmth(e), f)
+            } else {
+                Ok(())
+            }
+        })?;
+        self.nodal(&self.step.forces, &mut rhs)?;
+        Ok(rhs)
+    }
+
+    /// How everything moves with supports that move slowly, and Tᵀ M times that.
+    pub(super) fn carried(&self, job: &Job) -> Result<(Vec<f64>, Vec<f64>), LinearError> {
+        let (stiffness, rhs) =
+            self.assembled(job, |e, k, f| match e.checked_sub(self.deck.cells.len()) {
+                None => {
+                    // Of supports alone: what warms and strains from the beginning is no part of it.
+                    let mut other = vec![0.0; f.len()];
+                    self.element(e).stiffness(&self.warmth(e), |_| tensor::ZERO, k, &mut other)
+                }
+                Some(spring) => {
+                    self.deck.springs[spring].resist(k);
+                    Ok(())
+                }
+            })?;
+        let none = Constraints::new(self.free.count());
+        let found = solve(&stiffness, &rhs, &none, Method::Direct, TOLERANCE, job);
+        let free = found.map_err(|e| self.explained(e))?.x;
+        // Of the mass, what supports push is on the other side: −Tᵀ M c.
+        let (mass, pulled) = self.mass(job)?;
+        let pushed = modes::times(&mass, &free).iter().zip(&pulled).map(|(a, b)| a - b).collect();
+        Ok((self.free.expanded(&free), pushed))
+    }
+
+    fn mass(&self, job: &Job) -> Result<(BlockMatrix<1>, Vec<f64>), LinearError> {
+        let cells = self.deck.cells.len();
+        self.assembled(job, |e, m, _| {
+            if e < cells { self.element(e).mass(&self.warmth(e), m) } else { Ok(()) }
+        })
+    }
+
     /// Tᵀ K T and Tᵀ (f − K c) of what `fill` says of elements and springs.
-    fn assembled(
+    pub(super) fn assembled(
         &self,
         job: &Job,
         fill: impl Fn(usize, &mut [f64], &mut [f64]) -> Result<(), Folded> + Sync,
     ) -> Result<(BlockMatrix<1>, Vec<f64>), LinearError> {
-        self.free.assembled(job, |e| unknowns(self.deck, e), fill)
+        self.free.assembled(job, |e| unknowns(self.deck, e, self.large), fill)
     }
 
     fn solve(self, past: &mut Past, job: &Job) -> Result<Solved, LinearError> {
-        let (all, stresses, unknowns) = self.moved(job)?;
+        let all = self.moved(job)?;
+        let solved = self.finished(self.step.name.clone(), &all)?;
+        past.displacements = all;
+        past.stresses.clone_from(&solved.stresses);
+        past.large = false;
+        Ok(solved)
+    }
+
+    /// What these displacements of every unknown are to who asked.
+    pub(super) fn finished(&self, name: String, all: &[f64]) -> Result<Solved, LinearError> {
+        Ok(self.told(name, all, self.stresses(all)?))
+    }
+
+    /// The same with its stresses.
+    pub(super) fn told(&self, name: String, all: &[f64], stresses: Vec<Vec<Voigt>>) -> Solved {
         let places: Vec<DVec3> =
             all.as_chunks::<3>().0.iter().copied().map(DVec3::from_array).collect();
         let displacement = |n: u32| match self.deck.means.get(&n) {
             None => places[n as usize],
             Some(mean) => mean.iter().map(|&(m, share)| share * places[m as usize]).sum(),
         };
-        let displacements = (0..self.deck.labels.len() as u32).map(displacement);
-        past.displacements.clone_from(&all);
-        past.stresses.clone_from(&stresses);
-        Ok(Solved {
-            name: self.step.name.clone(),
-            displacements: displacements.collect(),
-            stresses,
-            unknowns,
-            ..Solved::default()
-        })
+        let displacements = (0..self.deck.labels.len() as u32).map(displacement).collect();
+        let unknowns = self.free.count();
+        Solved { name, displacements, stresses, unknowns, ..Solved::default() }
     }
 
-    /// Displacements of every unknown, stresses, and how many unknowns were solved for.
-    fn moved(&self, job: &Job) -> Result<(Vec<f64>, Vec<Vec<Voigt>>, usize), LinearError> {
+    /// Displacements of every unknown.
+    fn moved(&self, job: &Job) -> Result<Vec<f64>, LinearError> {
         let (matrix, mut rhs) = self.stiffness(job)?;
-        self.nodal(&mut rhs)?;
+        self.nodal(&self.step.forces, &mut rhs)?;
         let none = Constraints::new(self.free.count());
         let solution = if rhs.is_empty() {
             Vec::new()
@@ -277,12 +397,10 @@ impl<'a> System<'a> {
             }
             found.x
         };
-        let all = self.free.expanded(&solution);
-        let stresses = self.stresses(&all)?;
-        Ok((all, stresses, solution.len()))
+        Ok(self.free.expanded(&solution))
     }
 
-    fn floating(&self) -> LinearError {
+    pub(super) fn floating(&self) -> LinearError {
         LinearError::Floating { step: self.step.name.clone() }
     }
 
@@ -296,47 +414,48 @@ impl<'a> System<'a> {
         }
     }
 
-    /// The smallest squares of angular frequencies, with what stresses add to the stiffness.
-    fn modes(
+    /// The stiffness with what stresses add to it.
+    fn stiff_under(
         &self,
-        count: usize,
         stresses: &[Vec<Voigt>],
         job: &Job,
-    ) -> Result<Solved, LinearError> {
+    ) -> Result<BlockMatrix<1>, LinearError> {
         let (mut stiffness, _) = self.stiffness(job)?;
         if !stresses.is_empty() {
             stiffness.add(1.0, &self.stress_stiffness(stresses, job)?);
         }
-        let cells = self.deck.cells.len();
-        let (mass, _) = self.assembled(job, |e, m, _| {
-            if e < cells { self.element(e).mass(&self.warmth(e), m) } else { Ok(()) }
-        })?;
-        let found = modes::smallest(stiffness, &mass, count, job);
-        self.eigenvalues(found)
+        Ok(stiffness)
     }
 
     /// The smallest factors at which the loads of the step make the structure unstable:
     /// (K + λ K_σ) φ = 0.
-    fn buckling(&self, count: usize, job: &Job) -> Result<Solved, LinearError> {
-        let (_, stresses, _) = self.moved(job)?;
+    fn buckling(&self, count: usize, job: &Job) -> Result<Vec<Mode>, LinearError> {
+        let stresses = self.stresses(&self.moved(job)?)?;
         let (stiffness, _) = self.stiffness(job)?;
         let mut softening = self.stress_stiffness(&stresses, job)?;
         softening.scale(-1.0);
-        let found = modes::smallest(stiffness, &softening, count, job);
-        self.eigenvalues(found)
+        self.smallest(stiffness, &softening, count, job)
     }
 
-    fn eigenvalues(&self, found: Result<Vec<f64>, modes::Failed>) -> Result<Solved, LinearError> {
+    fn smallest(
+        &self,
+        stiffness: BlockMatrix<1>,
+        other: &BlockMatrix<1>,
+        count: usize,
+        job: &Job,
+    ) -> Result<Vec<Mode>, LinearError> {
         let step = self.step.name.clone();
-        let eigenvalues = found.map_err(|failed| match failed {
+        modes::smallest(stiffness, other, count, job).map_err(|failed| match failed {
             modes::Failed::Solve(error) => self.explained(error),
-            modes::Failed::Indefinite => LinearError::Unstable { step: step.clone() },
-            modes::Failed::NotConverged => {
-                LinearError::NotConverged { step: step.clone(), what: "eigenvalues" }
-            }
-        })?;
-        let unknowns = self.free.count();
-        Ok(Solved { name: step, eigenvalues, unknowns, ..Solved::default() })
+            modes::Failed::Indefinite => LinearError::Unstable { step },
+            modes::Failed::NotConverged => LinearError::NotConverged { step, what: "eigenvalues" },
+        })
+    }
+
+    fn eigenvalues(&self, modes: &[Mode]) -> Solved {
+        let (name, unknowns) = (self.step.name.clone(), self.free.count());
+        let eigenvalues = modes.iter().map(|m| m.value).collect();
+        Solved { name, eigenvalues, unknowns, ..Solved::default() }
     }
 
     fn stress_stiffness(
@@ -352,7 +471,7 @@ impl<'a> System<'a> {
     }
 
     /// What acts on elements.
-    fn distributed(&self) -> Result<Loads<'a>, LinearError> {
+    pub(super) fn distributed(&self) -> Result<Loads<'a>, LinearError> {
         let mut loads = Loads { by_cell: HashMap::new() };
         for (&(cell, face), &value) in &self.step.pressures {
             loads.by_cell.entry(cell).or_default().0.push((face, value));
@@ -372,8 +491,12 @@ impl<'a> System<'a> {
     }
 
     /// Adds forces at nodes.
-    fn nodal(&self, rhs: &mut [f64]) -> Result<(), LinearError> {
-        for (&(node, component), &force) in &self.step.forces {
+    pub(super) fn nodal(
+        &self,
+        forces: &BTreeMap<(u32, u8), f64>,
+        rhs: &mut [f64],
+    ) -> Result<(), LinearError> {
+        for (&(node, component), &force) in forces {
             let own = [(node, 1.0)];
             let on = self.deck.shares.get(&node).map_or(&own[..], Vec::as_slice);
             for (unknown, share) in self.deck.component(node, component) {
@@ -410,7 +533,7 @@ impl<'a> System<'a> {
     fn stresses(&self, all: &[f64]) -> Result<Vec<Vec<Voigt>>, LinearError> {
         let stress = |e: usize| {
             let own: Vec<f64> =
-                unknowns(self.deck, e).into_iter().map(|u| all[u as usize]).collect();
+                unknowns(self.deck, e, false).into_iter().map(|u| all[u as usize]).collect();
             let found = self.element(e).stresses(&own, &self.warmth(e), self.initial(e));
             found.map_err(|Folded| LinearError::Folded(self.deck.cells[e].label))
         };
@@ -418,16 +541,30 @@ impl<'a> System<'a> {
     }
 }
 
-/// Unknowns of an element or, after the elements, of a spring.
-fn unknowns(deck: &Deck, e: usize) -> Vec<u32> {
-    match deck.cells.get(e) {
-        Some(cell) => cell.nodes.iter().flat_map(|&n| (0..3).map(move |i| 3 * n + i)).collect(),
-        None => deck.springs[e - deck.cells.len()].terms.iter().map(|t| t.0).collect(),
+/// Every unknown by what is free.
+pub(super) fn sums(
+    deck: &Deck,
+    step: &Step,
+    equations: &[Equation],
+) -> Result<Vec<Sum>, LinearError> {
+    // Supports first: equations then bind what is left.
+    let bound = Bound::new(equations)
+        .map_err(|e| LinearError::Contradiction { step: step.name.clone(), line: e.line })?;
+    Ok((0..3 * deck.nodes.len() as u32).map(|u| bound.of(u)).collect())
+}
+
+/// Unknowns of an element or, after the elements, of a spring, which may turn.
+pub(super) fn unknowns(deck: &Deck, e: usize, large: bool) -> Vec<u32> {
+    let all = |nodes: &[u32]| nodes.iter().flat_map(|&n| (0..3).map(move |i| 3 * n + i)).collect();
+    let Some(spring) = e.checked_sub(deck.cells.len()) else { return all(&deck.cells[e].nodes) };
+    match &deck.springs[spring] {
+        Spring { ends: Some(ends), .. } if large => all(ends),
+        Spring { terms, .. } => terms.iter().map(|t| t.0).collect(),
     }
 }
 
 /// Pressures (face, Pa) and pulls of elements.
-struct Loads<'a> {
+pub(super) struct Loads<'a> {
     by_cell: HashMap<u32, (Vec<(u8, f64)>, Vec<&'a Pull>)>,
 }
 
@@ -439,12 +576,32 @@ impl Loads<'_> {
         warmth: &Warmth,
         force: &mut [f64],
     ) -> Result<(), Folded> {
-        let Some((pressures, pulls)) = self.by_cell.get(&(e as u32)) else { return Ok(()) };
+        let (pressures, pulls) = self.of(e);
         pressures.iter().for_each(|&(face, p)| element.pressure(usize::from(face), p, force));
+        self.pull(pulls, element, element, warmth, force)
+    }
+
+    /// Pressures and pulls of an element.
+    pub(super) fn of(&self, e: usize) -> (&[(u8, f64)], &[&Pull]) {
+        match self.by_cell.get(&(e as u32)) {
+            Some((pressures, pulls)) => (pressures.as_slice(), pulls.as_slice()),
+            None => (&[][..], &[][..]),
+        }
+    }
+
+    /// Forces on the mass of an element, where its nodes have gone to.
+    pub(super) fn pull(
+        &self,
+        pulls: &[&Pull],
+        element: &Element<'_>,
+        moved: &Element<'_>,
+        warmth: &Warmth,
+        force: &mut [f64],
+    ) -> Result<(), Folded> {
         let warm = warmth.now.iter().sum::<f64>() / warmth.now.len() as f64;
         let density = element.density(warm);
         for pull in pulls {
-            element.volume_force(|at| density * pull.at(at), force)?;
+            element.volume_force(|at| density * pull.at(moved.place(&at.jets)), force)?;
         }
         Ok(())
     }

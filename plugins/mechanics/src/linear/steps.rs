@@ -7,10 +7,12 @@ use glam::DVec3;
 use super::{
     constraint::Equation,
     flat::{Plane, SLICE},
-    law::ORDER,
+    law::{Elastic, ORDER},
+    link::Link,
     matter::all_numbers,
-    model::{Heated, Material, Procedure, Pull, Step},
+    model::{Course, Damping, Heated, Material, Procedure, Pull, Step},
     read::{Kind, Reader, Surface, plain},
+    shape::Shape,
     thin::Thin,
     tie::{self, Face},
     warm::is_temperature,
@@ -18,7 +20,7 @@ use super::{
 use crate::{
     model::interpolate,
     read::{
-        Fault,
+        Amplitude, Fault,
         abaqus::card::{Card, Row},
         quote,
     },
@@ -39,6 +41,7 @@ pub(super) struct State {
     held: BTreeMap<(u32, u8), Given<f64>>,
     kept: BTreeMap<(u32, u8), Given<f64>>,
     forces: BTreeMap<(u32, u8), Given<f64>>,
+    early: BTreeMap<(u32, u8), Given<f64>>,
     pressures: BTreeMap<(u32, u8), Given<f64>>,
     pulls: BTreeMap<(String, String), Given<(Vec<u32>, Pull)>>,
     warm: BTreeMap<u32, Given<f64>>,
@@ -46,6 +49,8 @@ pub(super) struct State {
     pub(super) heating: BTreeMap<Heated, Given<[f64; 2]>>,
     materials: BTreeMap<u32, u32>,
     pub(super) step: u32,
+    /// Whether displacements are large: from a step on until one says otherwise.
+    large: bool,
     open: Option<Open>,
     /// When the steps before it ended.
     time: f64,
@@ -53,14 +58,48 @@ pub(super) struct State {
 
 /// The step that is open.
 struct Open {
-    name: String,
     line: u32,
     duration: f64,
     perturbs: bool,
     procedure: Option<Procedure>,
+    damping: Damping,
 }
 
 impl State {
+    /// Supports, forces and weights, each times what its amplitude says.
+    fn loads(&self, factor: impl Fn(&Option<String>) -> Result<f64, Fault>) -> Result<Step, Fault> {
+        let times = |all: &BTreeMap<(u32, u8), Given<f64>>| {
+            let value = |(&key, g): (&(u32, u8), &Given<f64>)| {
+                Ok::<_, Fault>((key, g.value * factor(&g.amplitude)?))
+            };
+            all.iter().map(value).collect::<Result<BTreeMap<_, _>, _>>()
+        };
+        let mut step = Step {
+            name: format!("step {}", self.step),
+            number: self.step,
+            held: times(&self.held)?,
+            kept: self.kept.keys().copied().collect(),
+            forces: times(&self.forces)?,
+            early: times(&self.early)?,
+            pressures: times(&self.pressures)?,
+            materials: self.materials.clone(),
+            ..Step::default()
+        };
+        for pull in self.pulls.values() {
+            let factor = factor(&pull.amplitude)?;
+            let (elements, pull) = &pull.value;
+            step.pulls.extend(elements.iter().map(|&e| (e, pull.times(factor))));
+        }
+        Ok(step)
+    }
+
+    /// Every amplitude that supports and forces follow.
+    fn amplitudes(&self) -> BTreeSet<Option<String>> {
+        let nodal = [&self.held, &self.forces, &self.early, &self.pressures];
+        let nodal = nodal.into_iter().flat_map(|all| all.values().map(|g| &g.amplitude));
+        nodal.chain(self.pulls.values().map(|g| &g.amplitude)).cloned().collect()
+    }
+
     /// Every step that began has ended, and there was one.
     pub(super) fn ended(&self) -> Result<(), Fault> {
         match &self.open {
@@ -77,15 +116,24 @@ impl Reader {
     /// Everything that has an order.
     pub(super) fn history(&mut self, card: &Card<'_>, state: &mut State) -> Result<(), Fault> {
         let name = plain(card);
-        const WITHIN: &str = "STATIC FREQUENCY BUCKLE HEATTRANSFER ENDSTEP CLOAD DLOAD DSLOAD \
-            TEMPERATURE CFLUX DFLUX FILM RADIATE CHANGESOLIDSECTION";
+        const WITHIN: &str = "STATIC DYNAMIC FREQUENCY BUCKLE HEATTRANSFER MODALDYNAMIC \
+            STEADYSTATEDYNAMICS MODALDAMPING ENDSTEP CLOAD DLOAD DSLOAD TEMPERATURE CFLUX DFLUX \
+            FILM RADIATE CHANGESOLIDSECTION";
         if WITHIN.split_ascii_whitespace().any(|w| w == name) && state.open.is_none() {
             return Err(card.fault(format!("*{} must stand in a *STEP", card.name)));
         }
         match name.as_str() {
             "STEP" => begin(card, state),
-            "STATIC" | "FREQUENCY" | "BUCKLE" | "HEATTRANSFER" => procedure(card, &name, state),
+            "STATIC"
+            | "DYNAMIC"
+            | "FREQUENCY"
+            | "BUCKLE"
+            | "HEATTRANSFER"
+            | "MODALDYNAMIC"
+            | "STEADYSTATEDYNAMICS" => procedure(card, &name, state),
+            "MODALDAMPING" => damping(card, state),
             "ENDSTEP" => self.close(state),
+            "EQUATION" => self.end_equations(card, state),
             "BOUNDARY" => self.boundary(card, state),
             "CLOAD" => self.cload(card, state),
             "DLOAD" | "DSLOAD" => self.dload(card, state, name == "DSLOAD"),
@@ -101,10 +149,9 @@ impl Reader {
     /// What is in force at the end of the step.
     fn close(&mut self, state: &mut State) -> Result<(), Fault> {
         let Some(open) = state.open.take() else { return Ok(()) };
-        let Open { name, line, duration, .. } = open;
+        let Open { line, duration, damping, .. } = open;
         let procedure = open.procedure.unwrap_or_default();
         self.suits(procedure, state, line)?;
-        let mut step = Step { name, number: state.step, procedure, ..Step::default() };
         let in_time = matches!(procedure, Procedure::Heat { steady: false, .. });
         let factor = |amplitude: &Option<String>| -> Result<f64, Fault> {
             let Some(name) = amplitude else { return Ok(1.0) };
@@ -113,21 +160,21 @@ impl Reader {
                     "what heats over time is computed where it stays the same, without AMPLITUDE";
                 return Err(Fault::at(line, why));
             }
-            let missing = || Fault::at(line, format!("amplitude {} is not defined", quote(name)));
-            let amplitude = self.amplitudes.get(name).ok_or_else(missing)?;
+            let amplitude = self.amplitude_of(name, line)?;
             let time = if amplitude.total_time { state.time + duration } else { duration };
             Ok(interpolate(&amplitude.points, time).unwrap_or(1.0))
         };
-        let at_end = |all: &BTreeMap<(u32, u8), Given<f64>>| {
-            let value = |(&key, g): (&(u32, u8), &Given<f64>)| {
-                Ok::<_, Fault>((key, g.value * factor(&g.amplitude)?))
-            };
-            all.iter().map(value).collect::<Result<BTreeMap<_, _>, _>>()
+        let mut step = if let Procedure::Motion { .. }
+        | Procedure::Dynamic { .. }
+        | Procedure::Harmonic { .. } = procedure
+        {
+            Step { courses: self.courses(procedure, state, line)?, ..state.loads(|_| Ok(0.0))? }
+        } else {
+            state.loads(&factor)?
         };
-        (step.held, step.forces) = (at_end(&state.held)?, at_end(&state.forces)?);
-        step.pressures = at_end(&state.pressures)?;
-        step.kept = state.kept.keys().copied().collect();
-        step.materials.clone_from(&state.materials);
+        (step.procedure, step.damping) = (procedure, damping);
+        let may_be_large = matches!(procedure, Procedure::Static | Procedure::Dynamic { .. });
+        step.large = state.large && may_be_large;
         if let Procedure::Heat { .. } | Procedure::Modes { heat: true, .. } = procedure {
             for (&node, given) in &state.temperatures {
                 step.temperatures.insert(node, given.value * factor(&given.amplitude)?);
@@ -138,11 +185,6 @@ impl Reader {
                 step.heating.insert(heated, [given.value[0] * factor, given.value[1]]);
             }
         }
-        for pull in state.pulls.values() {
-            let factor = factor(&pull.amplitude)?;
-            let (elements, pull) = &pull.value;
-            step.pulls.extend(elements.iter().map(|&e| (e, pull.times(factor))));
-        }
         if !state.warm.is_empty() {
             step.warm.clone_from(&self.deck.cold);
             for (&node, warm) in &state.warm {
@@ -151,6 +193,78 @@ impl Reader {
         }
         state.time += duration;
         self.deck.steps.push(step);
+        Ok(())
+    }
+
+    fn amplitude_of(&self, name: &str, line: u32) -> Result<&Amplitude, Fault> {
+        let missing = || Fault::at(line, format!("amplitude {} is not defined", quote(name)));
+        self.amplitudes.get(name).ok_or_else(missing)
+    }
+
+    /// What acts in a step of motion or vibration, by the amplitudes that it follows.
+    fn courses(
+        &self,
+        procedure: Procedure,
+        state: &State,
+        line: u32,
+    ) -> Result<Vec<Course>, Fault> {
+        let mut courses = Vec::new();
+        for amplitude in state.amplitudes() {
+            let mut points = Vec::new();
+            if let Some(name) = &amplitude {
+                let found = self.amplitude_of(name, line)?;
+                let in_total = found.total_time && !matches!(procedure, Procedure::Harmonic { .. });
+                let begin = if in_total { state.time } else { 0.0 };
+                points.extend(found.points.iter().map(|&(at, factor)| (at - begin, factor)));
+            }
+            let own = |other: &Option<String>| Ok(if *other == amplitude { 1.0 } else { 0.0 });
+            let mut loads = state.loads(own)?;
+            let base = Step {
+                name: loads.name.clone(),
+                number: state.step,
+                held: loads.held.clone(),
+                materials: loads.materials.clone(),
+                ..Step::default()
+            };
+            loads.held.values_mut().for_each(|value| *value = 0.0);
+            self.moves(&base, &points, procedure, line)?;
+            courses.push(Course { points, loads, base });
+        }
+        Ok(courses)
+    }
+
+    /// Supports that move begin where they are, in fixed increments, and carry what has no stress.
+    fn moves(
+        &self,
+        base: &Step,
+        points: &[(f64, f64)],
+        procedure: Procedure,
+        line: u32,
+    ) -> Result<(), Fault> {
+        let in_modes = !matches!(procedure, Procedure::Dynamic { .. });
+        if !in_modes || base.held.values().all(|value| *value == 0.0) {
+            return Ok(());
+        }
+        let is_stressed = |s: &Step| matches!(s.procedure, Procedure::Modes { stressed: true, .. });
+        if self.deck.steps.iter().any(is_stressed) {
+            return Err(Fault::at(
+                line,
+                "supports that move what is under stress are not computed",
+            ));
+        }
+        if self.deck.springs.iter().any(|s| !s.drag.is_empty()) {
+            return Err(Fault::at(line, "supports that move beside dashpots are not computed"));
+        }
+        let Procedure::Motion { increment, .. } = procedure else { return Ok(()) };
+        let follows =
+            self.deck.steps.last().is_some_and(|s| matches!(s.procedure, Procedure::Motion { .. }));
+        if follows || interpolate(points, 0.0).unwrap_or(1.0) != 0.0 {
+            let why = "supports that move need an AMPLITUDE that begins at 0, in the first step of motion";
+            return Err(Fault::at(line, why));
+        }
+        if increment.is_none() {
+            return Err(Fault::at(line, "supports that move need fixed increments, not DIRECT=NO"));
+        }
         Ok(())
     }
 
@@ -169,6 +283,38 @@ impl Reader {
             matches!(procedure, Procedure::Heat { .. } | Procedure::Modes { heat: true, .. });
         if !heats {
             lacks(|m| m.elastic.is_some(), "*ELASTIC")?;
+            let flows = match procedure {
+                Procedure::Static | Procedure::Dynamic { .. } => state.large,
+                other => matches!(other, Procedure::Modes { .. }),
+            };
+            let is_known = |m: &Material| {
+                (flows && matches!(m.elastic, Some(Elastic::Isotropic(_)))) || m.plastic.is_none()
+            };
+            let mut used = used.clone().map(|m| &self.deck.materials[m as usize]);
+            if let Some(material) = used.find(|m| !is_known(m)) {
+                let why = "*PLASTIC is computed of what is isotropic, with NLGEOM";
+                return Err(Fault::at(line, format!("material {}: {why}", material.name)));
+            }
+        }
+        if let Procedure::Motion { .. } | Procedure::Harmonic { .. } = procedure {
+            return self.vibrates(state, line);
+        }
+        if let Procedure::Dynamic { .. } = procedure {
+            lacks(|m| m.density.is_some(), "*DENSITY")?;
+            if !state.warm.is_empty() {
+                return Err(Fault::at(line, "a *TEMPERATURE in a *DYNAMIC step is not computed"));
+            }
+        }
+        let may_be_large = matches!(procedure, Procedure::Static | Procedure::Dynamic { .. });
+        if state.large && may_be_large {
+            return self.turns();
+        }
+        if !heats && self.deck.springs.iter().any(|s| !s.law.is_empty()) {
+            return Err(Fault::at(line, "a *SPRING, NONLINEAR is computed with NLGEOM alone"));
+        }
+        let was_large = self.deck.steps.last().is_some_and(|s| s.large);
+        if was_large && matches!(procedure, Procedure::Buckling { .. }) {
+            return Err(Fault::at(line, "*BUCKLE after large displacements is not computed"));
         }
         if let Procedure::Modes { heat: false, .. } = procedure {
             lacks(|m| m.density.is_some(), "*DENSITY")?;
@@ -199,6 +345,38 @@ impl Reader {
         }
         if self.tied {
             return Err(Fault::at(line, "heat through a *TIE is not computed"));
+        }
+        Ok(())
+    }
+
+    /// Every element is known where displacements are large.
+    fn turns(&self) -> Result<(), Fault> {
+        let lacks = |kind: Kind| match kind {
+            Kind::Solid(Shape::Hex8Bubbles)
+            | Kind::Thin(
+                Thin::Beam { shape: Shape::Hex8Bubbles, .. }
+                | Thin::Shell { shape: Shape::Hex8Bubbles, .. },
+            ) => Some("C3D8I, B31 and S4"),
+            Kind::Link(Link::Damper) => Some("dashpots"),
+            _ => None,
+        };
+        match self.raw.iter().find_map(|raw| Some((raw, lacks(raw.kind)?))) {
+            None => Ok(()),
+            Some((raw, what)) => {
+                let why = "are not computed where displacements are large (NLGEOM)";
+                Err(Fault::at(raw.line, format!("element {}: {what} {why}", raw.label)))
+            }
+        }
+    }
+
+    /// A step of motion or vibration follows one of frequencies, and nothing warms in it.
+    fn vibrates(&self, state: &State, line: u32) -> Result<(), Fault> {
+        let is_modes = |s: &Step| matches!(s.procedure, Procedure::Modes { heat: false, .. });
+        if !self.deck.steps.iter().any(is_modes) {
+            return Err(Fault::at(line, "needed is a step of *FREQUENCY before this one"));
+        }
+        if !state.warm.is_empty() {
+            return Err(Fault::at(line, "a *TEMPERATURE in motion by modes is not computed"));
         }
         Ok(())
     }
@@ -288,9 +466,17 @@ impl Reader {
 
     /// Forces. What is given twice in a step adds up, as in CalculiX.
     fn cload(&mut self, card: &Card<'_>, state: &mut State) -> Result<(), Fault> {
-        card.only(&["OP", "AMPLITUDE"])?;
+        card.only(&["OP", "AMPLITUDE", "TIME DELAY", "LOAD CASE"])?;
         clear(card, state.step, &mut state.forces, |_| true)?;
-        let amplitude = super::mesh::name_of(card, "AMPLITUDE")?;
+        clear(card, state.step, &mut state.early, |_| true)?;
+        let forces = match card.get("LOAD CASE") {
+            None | Some("1") => &mut state.forces,
+            Some("2") if harmonic(state.open.as_ref()) => &mut state.early,
+            Some(_) => {
+                return Err(card.fault("LOAD CASE is 1, or 2 in *STEADY STATE DYNAMICS"));
+            }
+        };
+        let amplitude = self.delayed(card)?;
         let around = self.around_nodes();
         for row in card.rows() {
             let [target, direction, value] = row.exactly("node or set, component, force")?;
@@ -302,16 +488,33 @@ impl Reader {
                 // A moment is of newtons and lengths.
                 let unit = if direction < 3 { 1.0 } else { self.units.length() };
                 let mut value = value * share * unit;
-                if let Some(old) = state.forces.get(&at)
+                if let Some(old) = forces.get(&at)
                     && old.step == state.step
                 {
                     value += old.value;
                 }
                 let given = Given { value, amplitude: amplitude.clone(), step: state.step };
-                state.forces.insert(at, given);
+                forces.insert(at, given);
             }
         }
         Ok(())
+    }
+
+    /// The amplitude that a card names, which begins later where it says so.
+    fn delayed(&mut self, card: &Card<'_>) -> Result<Option<String>, Fault> {
+        let (Some(name), Some(delay)) =
+            (super::mesh::name_of(card, "AMPLITUDE")?, card.get("TIME DELAY"))
+        else {
+            return super::mesh::name_of(card, "AMPLITUDE");
+        };
+        let wrong = || card.fault(format!("TIME DELAY={} is no time", quote(delay)));
+        let by: f64 = delay.parse().map_err(|_| wrong())?;
+        let mut later = self.amplitude_of(&name, card.line)?.clone();
+        later.points.iter_mut().for_each(|p| p.0 += by);
+        later.name = format!("{name} {by} s later");
+        let name = later.name.clone();
+        self.amplitudes.insert(name.clone(), later);
+        Ok(Some(name))
     }
 
     pub(super) fn around_nodes(&self) -> BTreeSet<u32> {
@@ -481,7 +684,7 @@ impl Reader {
 
     /// `*EQUATION`: how many terms, then node, component and factor of each.
     pub(super) fn equation(&mut self, card: &Card<'_>) -> Result<(), Fault> {
-        if plain(card) != "EQUATION" {
+        if plain(card) != "EQUATION" || ends(card) {
             return Ok(());
         }
         card.only(&[])?;
@@ -491,6 +694,7 @@ impl Reader {
             let count = count.filter(|n| (1..=100_000).contains(n));
             let count = count.ok_or_else(|| row.fault("here stands how many terms follow"))?;
             let mut terms: Vec<(u32, f64)> = Vec::new();
+            let mut first = None;
             for _ in 0..count.div_ceil(4) {
                 let next =
                     rows.next().ok_or_else(|| row.fault(format!("{count} terms must follow")))?;
@@ -502,11 +706,32 @@ impl Reader {
                 for [node, direction, factor] in all {
                     let (node, factor) = (self.node(node, next)?, next.number(factor)?);
                     let (at, _) = self.motion(node, component(direction, next)?, None, next)?;
+                    first.get_or_insert(at);
                     let own = self.deck.component(at.0, at.1);
                     terms.extend(own.into_iter().map(|(u, f)| (u, f * factor)));
                 }
             }
+            self.equations.extend(first.map(|at| (at, self.deck.equations.len())));
             self.deck.equations.push(Equation { terms, value: 0.0, line: row.line });
+        }
+        Ok(())
+    }
+
+    /// `*EQUATION, REMOVE` with components that come first in equations, and `REMOVE ALL`.
+    fn end_equations(&mut self, card: &Card<'_>, state: &State) -> Result<(), Fault> {
+        if !ends(card) {
+            return Ok(());
+        }
+        card.only(&["REMOVE", "REMOVE ALL"])?;
+        if card.get("REMOVE ALL").is_some() {
+            self.ended.push((state.step, None));
+        }
+        for row in card.rows() {
+            let [target, direction] = row.exactly("node or set, component")?;
+            let component = component(direction, row)?;
+            for node in self.some_nodes(target, row)? {
+                self.ended.push((state.step, Some((node, component))));
+            }
         }
         Ok(())
     }
@@ -575,6 +800,15 @@ impl Reader {
     }
 }
 
+/// Whether an `*EQUATION` ends others.
+fn ends(card: &Card<'_>) -> bool {
+    ["REMOVE", "REMOVE ALL"].into_iter().any(|word| card.get(word).is_some())
+}
+
+fn harmonic(open: Option<&Open>) -> bool {
+    matches!(open.and_then(|o| o.procedure), Some(Procedure::Harmonic { .. }))
+}
+
 /// Opens a step.
 fn begin(card: &Card<'_>, state: &mut State) -> Result<(), Fault> {
     if let Some(open) = &state.open {
@@ -582,17 +816,16 @@ fn begin(card: &Card<'_>, state: &mut State) -> Result<(), Fault> {
     }
     state.step += 1;
     state.open = Some(Open {
-        name: format!("step {}", state.step),
         line: card.line,
         duration: 1.0,
         perturbs: card.get("PERTURBATION").is_some(),
         procedure: None,
+        damping: Damping::None,
     });
-    card.only(&["NAME", "INC", "AMPLITUDE", "NLGEOM", "PERTURBATION"])?;
-    if card.word("NLGEOM").is_some_and(|v| v != "NO") {
-        return Err(card.fault("*STEP, NLGEOM: large displacements are not computed"));
+    if let Some(word) = card.word("NLGEOM") {
+        state.large = word != "NO";
     }
-    Ok(())
+    card.only(&["NAME", "INC", "AMPLITUDE", "NLGEOM", "PERTURBATION"])
 }
 
 /// What a step computes, and how.
@@ -625,6 +858,21 @@ fn procedure(card: &Card<'_>, name: &str, state: &mut State) -> Result<(), Fault
             card.only(&["SOLVER"])?;
             Procedure::Buckling { count: many(card, &numbers)? }
         }
+        "DYNAMIC" => {
+            card.only(&["SOLVER", "DIRECT", "ALPHA"])?;
+            open.duration = duration(card, &numbers)?;
+            dynamic(card, &numbers, open.duration)?
+        }
+        "MODALDYNAMIC" => {
+            card.only(&["SOLVER", "DIRECT", "DELTMX"])?;
+            open.duration = duration(card, &numbers)?;
+            motion(card, &numbers, open.duration)?
+        }
+        "STEADYSTATEDYNAMICS" => {
+            card.only(&["SOLVER", "HARMONIC"])?;
+            open.duration = 0.0;
+            vibration(card, &numbers)?
+        }
         _ => {
             const ALLOWED: [&str; 7] = [
                 "STEADY STATE",
@@ -651,6 +899,87 @@ fn procedure(card: &Card<'_>, name: &str, state: &mut State) -> Result<(), Fault
     };
     open.procedure = Some(procedure);
     Ok(())
+}
+
+/// Motion by the equations themselves.
+fn dynamic(card: &Card<'_>, numbers: &[f64], duration: f64) -> Result<Procedure, Fault> {
+    let alpha = card.get("ALPHA").map_or(Ok(-0.05), |word| {
+        let range = -1.0 / 3.0 - 1e-9..=0.0;
+        let found = word.parse::<f64>().ok().filter(|alpha| range.contains(alpha));
+        found.ok_or_else(|| card.fault("ALPHA is a number from −1/3 to 0"))
+    })?;
+    let fixed = card.word("DIRECT").is_some_and(|word| word != "NO");
+    match numbers.first().copied().unwrap_or(duration) {
+        first if first > 0.0 && duration / first <= 1e6 => {
+            Ok(Procedure::Dynamic { increment: first.min(duration), fixed, duration, alpha })
+        }
+        first => Err(card.fault(format!("increments of {first} s in {duration} s"))),
+    }
+}
+
+/// Motion in increments that are fixed, or as fine as what acts.
+fn motion(card: &Card<'_>, numbers: &[f64], duration: f64) -> Result<Procedure, Fault> {
+    if card.word("DIRECT").is_some_and(|d| d == "NO") {
+        return Ok(Procedure::Motion { increment: None, duration });
+    }
+    match numbers.first().copied().unwrap_or(duration) {
+        first if first > 0.0 && duration / first <= 1e7 => {
+            Ok(Procedure::Motion { increment: Some(first.min(duration)), duration })
+        }
+        first => Err(card.fault(format!("increments of {first} s in {duration} s"))),
+    }
+}
+
+/// `*MODAL DAMPING`
+fn damping(card: &Card<'_>, state: &mut State) -> Result<(), Fault> {
+    card.only(&["RAYLEIGH"])?;
+    let Some(open) = &mut state.open else { return Ok(()) };
+    let positive = |word: &str, row: Row<'_>| match row.number(word)? {
+        value if value >= 0.0 => Ok(value),
+        other => Err(row.fault(format!("damping must not be below 0, not {other}"))),
+    };
+    if card.get("RAYLEIGH").is_some() {
+        let row = card.one_row()?.ok_or_else(|| card.fault("needed are: , , α, β"))?;
+        let [_, _, mass, stiffness] = row.exactly(", , α, β")?;
+        let (mass, stiffness) = (positive(mass, row)?, positive(stiffness, row)?);
+        open.damping = Damping::Rayleigh { mass, stiffness };
+        return Ok(());
+    }
+    let mut shares = Vec::new();
+    for row in card.rows() {
+        let [first, last, share] = row.exactly("first and last mode, part of critical")?;
+        let number = |w: &str| w.parse::<usize>().ok().filter(|n| (1..=10_000).contains(n));
+        let (Some(first), Some(last)) = (number(first), number(last)) else {
+            return Err(row.fault("a mode is a number from 1 to 10000"));
+        };
+        let share = positive(share, row)?;
+        shares.resize(shares.len().max(last), 0.0);
+        shares.iter_mut().take(last).skip(first - 1).for_each(|s| *s = share);
+    }
+    open.damping = Damping::Shares(shares);
+    Ok(())
+}
+
+/// Frequencies from and to, Hz; how many between two modes; how near to these.
+fn vibration(card: &Card<'_>, numbers: &[f64]) -> Result<Procedure, Fault> {
+    if card.word("HARMONIC").is_some_and(|h| h != "YES") {
+        return Err(card.fault("loads that are not harmonic are not computed"));
+    }
+    let (&[from, to], rest) = numbers.split_first_chunk().ok_or_else(|| {
+        card.fault("needed are: lowest and highest frequency, how many between two modes, bias")
+    })?;
+    let points = rest.first().copied().unwrap_or(20.0);
+    let bias = rest.get(1).copied().unwrap_or(3.0);
+    let ascend = from >= 0.0 && to >= from && to.is_finite();
+    if !ascend {
+        return Err(card.fault(format!("frequencies from {from} to {to}")));
+    }
+    if !(2.0..=10_000.0).contains(&points) || bias.is_nan() || bias < 1.0 || rest.len() > 2 {
+        return Err(
+            card.fault("2 to 10000 frequencies between two modes, with a bias of 1 or more")
+        );
+    }
+    Ok(Procedure::Harmonic { range: [from, to], points: points as u32, bias })
 }
 
 fn duration(card: &Card<'_>, numbers: &[f64]) -> Result<f64, Fault> {

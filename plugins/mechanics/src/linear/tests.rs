@@ -360,10 +360,10 @@ fn a_disc_that_spins_has_the_stress_of_the_closed_form() {
 
 #[test]
 fn all_that_is_not_computed_is_named_at_once() {
-    let deck = "*NODE\n1,0,0\n*ELEMENT,TYPE=F3D8,ELSET=ALL\n1,1\n*MATERIAL,NAME=M\n*PLASTIC\n1,2\n*STEP\n*MODAL DYNAMIC\n3\n*END STEP\n";
+    let deck = "*NODE\n1,0,0\n*ELEMENT,TYPE=F3D8,ELSET=ALL\n1,1\n*MATERIAL,NAME=M\n*CREEP\n1,2\n*STEP\n*COMPLEX FREQUENCY\n3\n*END STEP\n";
     let line = refusal(deck);
     for part in
-        ["deck.inp:3: elements of type \"F3D8\"", "line 6: *PLASTIC", "line 9: *MODAL DYNAMIC"]
+        ["deck.inp:3: elements of type \"F3D8\"", "line 6: *CREEP", "line 9: *COMPLEX FREQUENCY"]
     {
         assert!(line.contains(part), "{line}");
     }
@@ -382,7 +382,6 @@ fn faults_are_named_with_their_lines() {
     let line = refusal(&good.replace("200.,.3", "200.,.6").replace("*DENSITY\n3.", "*DENSITY\nx"));
     assert!(line.contains("Poisson") && line.contains("\"x\" is not a number"), "{line}");
     assert!(refusal(&good.replace("*END STEP\n", "")).contains("without *END STEP"));
-    assert!(refusal(&good.replace("*STEP\n", "*STEP,NLGEOM\n")).contains("large displacements"));
     let two = "*EQUATION\n1\n3,1,1.\n*EQUATION\n1\n3,1,2.\n";
     let moved = good.replace("*BOUNDARY", &format!("{two}*BOUNDARY"));
     assert!(parse(moved.as_bytes(), Path::new("deck.inp"), Units::MetreNewton).is_ok());

@@ -14,7 +14,7 @@ use glam::DVec3;
 
 use super::{
     constraint::Equation,
-    link::{mean_rotation, terms},
+    curve::Curve,
     model::{Cell, Deck},
     read::{Kind, Raw, Reader, Section},
     shape::{GAUSS_2, Point, Shape, face_functions, face_places},
@@ -261,13 +261,10 @@ impl Reader {
             return Some(turning);
         }
         let turning = self.hidden_node(node);
-        let places: Vec<DVec3> = ring.outer.iter().map(|&n| self.deck.nodes[n as usize]).collect();
-        for (i, axis) in DVec3::AXES.into_iter().enumerate() {
+        for (i, axis) in (0..).zip(DVec3::AXES) {
+            let (nodes, angle) = (ring.outer.clone(), 3 * turning + i);
             // Two nodes along an axis say nothing of a turn about it.
-            let Some(factors) = mean_rotation(&places, axis) else { continue };
-            let mut all = terms(&ring.outer, &factors);
-            all.push((3 * turning + i as u32, -1.0));
-            self.deck.equations.push(Equation { terms: all, value: 0.0, line: row.line });
+            self.bound(Curve::Turn { nodes, axis, angle, unit: 1.0 }, row.line);
         }
         self.turning.insert(node, turning);
         Some(turning)

@@ -100,6 +100,12 @@ impl<'a> Lines<'a> {
     }
 }
 
+/// Whether two names differ in spaces alone, which CalculiX leaves out.
+fn alike(a: &str, b: &str) -> bool {
+    let letters = |name| str::chars(name).filter(|c| *c != ' ');
+    letters(a).eq(letters(b))
+}
+
 /// In capitals, words one space apart.
 fn words(text: &str) -> String {
     let mut words = String::with_capacity(text.len());
@@ -123,7 +129,7 @@ impl<'a> Card<'a> {
 
     /// The value of a parameter (empty for a flag); none where it is not there.
     pub(crate) fn get(&self, name: &str) -> Option<&'a str> {
-        self.parameters.iter().find(|p| p.0 == name).map(|p| p.1)
+        self.parameters.iter().find(|p| alike(&p.0, name)).map(|p| p.1)
     }
 
     /// The value of a parameter in capitals; none where it is not there.
@@ -142,7 +148,7 @@ impl<'a> Card<'a> {
     /// Refuses parameters other than these, and any of them twice.
     pub(crate) fn only(&self, allowed: &[&str]) -> Result<(), Fault> {
         for (i, (name, _)) in self.parameters.iter().enumerate() {
-            if !allowed.contains(&name.as_str()) {
+            if !allowed.iter().any(|a| alike(a, name)) {
                 let allowed =
                     if allowed.is_empty() { "none".to_owned() } else { allowed.join(", ") };
                 return Err(self.fault(format!(
@@ -151,7 +157,7 @@ impl<'a> Card<'a> {
                     quote(name)
                 )));
             }
-            if self.parameters[..i].iter().any(|p| p.0 == *name) {
+            if self.parameters[..i].iter().any(|p| alike(&p.0, name)) {
                 return Err(self.fault(format!("*{}: parameter {name} is given twice", self.name)));
             }
         }
