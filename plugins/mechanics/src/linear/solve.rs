@@ -569,7 +569,7 @@ pub(super) struct Loads<'a> {
 }
 
 impl Loads<'_> {
-    fn add(
+    pub(super) fn add(
         &self,
         e: usize,
         element: &Element<'_>,

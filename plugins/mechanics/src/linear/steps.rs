@@ -170,7 +170,7 @@ impl Reader {
         {
             Step { courses: self.courses(procedure, state, line)?, ..state.loads(|_| Ok(0.0))? }
         } else {
-            state.loads(&factor)?
+            state.loads(factor)?
         };
         (step.procedure, step.damping) = (procedure, damping);
         let may_be_large = matches!(procedure, Procedure::Static | Procedure::Dynamic { .. });
