@@ -32,7 +32,7 @@
 
 use super::DAY;
 use super::law::{Clock, Concrete, ROUNDS, Response, State, Step, crushing_stress, reach};
-use super::softening::{Compression, Knee};
+use super::softening::{Compression, Held, Knee};
 use crate::tensor::{self, Frame, Principal, Tangent, Voigt, ZERO};
 
 /// What the planes of a point remember.
@@ -48,6 +48,8 @@ pub struct Planes {
     pub damage: [f64; 3],
     /// How much of what is pulled across each is lost: less where bars hold it together.
     pub across: [f64; 3],
+    /// The most that bars along each axis of the world have been strained with it.
+    pub stretched: [f64; 3],
     /// Shear stress by interlock and friction on 12, 23 and 31, Pa.
     pub friction: [f64; 3],
     /// Shear strain by which it is locked.
@@ -67,6 +69,9 @@ const ACROSS: f64 = 0.8;
 
 /// Largest grain of the aggregate, mm: the usual one, for sources seldom tell it.
 const GRAIN: f64 = 16.0;
+
+/// By how much faces that part interlock less, 1/m (Vecchio and Collins 1986).
+const PARTING: f64 = 24e3 / (GRAIN + 16.0) / 0.31;
 
 /// Faces of a crack, rough as concrete breaks.
 #[derive(Debug, Clone, Copy)]
@@ -92,8 +97,17 @@ impl Faces {
     /// Shear stress at which they slide past each other, Pa (Vecchio and Collins 1986), and by
     /// friction if they are `pressed` together, Pa.
     fn most(&self, width: f64, pressed: f64) -> f64 {
-        0.18e6 * self.strength.sqrt() / (0.31 + 24e3 * width / (GRAIN + 16.0)) + FRICTION * pressed
+        self.shut() / (1.0 + PARTING * width) + FRICTION * pressed
     }
+
+    /// The same without friction where they are shut.
+    fn shut(&self) -> f64 {
+        0.18e6 * self.strength.sqrt() / 0.31
+    }
+}
+
+fn faces(clock: &Clock) -> Faces {
+    Faces { strength: 1e-6 * clock.aged.fcm }
 }
 
 /// The planes of each component of shear.
@@ -106,6 +120,7 @@ pub(crate) const SOUND: Planes = Planes {
     asked: [0.0; 3],
     damage: [0.0; 3],
     across: [0.0; 3],
+    stretched: [0.0; 3],
     friction: [0.0; 3],
     locked: [0.0; 3],
     fixed: false,
@@ -139,6 +154,12 @@ impl Planes {
             if now > best.1 { (order, now) } else { best }
         });
         best.0.map(|i| principal[i])
+    }
+
+    /// The largest shear that interlock and friction bear on a plane, Pa.
+    fn sheared(&self, plane: usize) -> f64 {
+        let on = PAIRS.iter().zip(self.friction).filter(|((i, j), _)| *i == plane || *j == plane);
+        on.map(|(_, friction)| friction.abs()).fold(0.0, f64::max)
     }
 
     /// Strains that each plane has known once it is asked for `asked`.
@@ -259,8 +280,7 @@ impl Cracked {
     /// In planes that stay: what is broken still interlocks, or rubs. `shear` is the modulus of
     /// what is whole.
     fn rubbing(mut self, point: &Point, damage: [f64; 3], shear: f64) -> Self {
-        let (before, faces) =
-            (&point.state.planes, Faces { strength: 1e-6 * point.clock.aged.fcm });
+        let (before, faces) = (&point.state.planes, faces(point.clock));
         for (n, (i, j)) in PAIRS.into_iter().enumerate() {
             let k = n + 3;
             let (mut give, mut most) = (1.0 / shear, f64::INFINITY);
@@ -399,11 +419,19 @@ impl Concrete {
             false => before.turned(&effective),
         };
         let bands = axes.map(|n| step.ties.band(&n, self.along(&n, step), clock.aged.fctm));
+        let stretched = match growth {
+            Some(_) => before.stretched,
+            None => std::array::from_fn(|a| before.stretched[a].max(strain[a])),
+        };
         let laws = std::array::from_fn(|i| {
             let (fctm, energy) = (clock.aged.fctm, self.properties.fracture_energy);
             let law = Knee::of(self.elastic.modulus, fctm, energy, bands[i]);
             match self.setting.bonded {
-                true => law.with(step.ties.held(&axes[i], fctm)),
+                true => law.with(Held {
+                    interlock: [faces(&clock).shut() / fctm.max(1.0), PARTING * bands[i]],
+                    sheared: before.sheared(i) / fctm.max(1.0),
+                    ..step.ties.held(&axes[i], fctm, &stretched)
+                }),
                 false => law,
             }
         });
@@ -433,7 +461,8 @@ impl Concrete {
             kappa = next;
             found = self.judge_planes(&point, kappa);
         }
-        let response = self.cracked_response(&point, &found, kappa, bands, step, growth);
+        let mut response = self.cracked_response(&point, &found, kappa, bands, step, growth);
+        response.state.planes.stretched = stretched;
         let mechanical = tensor::sub(
             &effective,
             &tensor::scale(&found.drive, creep / (self.elastic.modulus * clock.nonlinear)),
@@ -620,6 +649,7 @@ impl Concrete {
                     asked: found.asked,
                     damage: found.lost.damage,
                     across: found.lost.across,
+                    stretched: state.planes.stretched,
                     friction: found.cracked.friction,
                     locked: found.cracked.locked,
                     fixed,

@@ -207,16 +207,17 @@ impl Ties {
     }
 
     /// What their bond gives back to concrete of strength `fctm` (Pa) between cracks across a unit
-    /// direction.
+    /// direction, if bars along each axis have been `stretched` so far.
     #[must_use]
-    pub(super) fn held(&self, n: &[f64; 3], fctm: f64) -> Held {
+    pub(super) fn held(&self, n: &[f64; 3], fctm: f64, stretched: &[f64; 3]) -> Held {
         let square = n.map(|n| n * n);
         let reached: f64 = square.iter().zip(self.reached).map(|(n, share)| n * share).sum();
-        let over = 1.0 / fctm.max(1.0);
+        let left = |a: usize| (self.left[a] - self.stiffness[a] * stretched[a].max(0.0)).max(0.0);
         Held {
             most: BETWEEN.map(|most| most * reached.min(1.0)),
-            yielding: std::array::from_fn(|a| square[a] * self.left[a] * over),
-            stiffness: std::array::from_fn(|a| square[a] * square[a] * self.stiffness[a] * over),
+            left: std::array::from_fn(|a| left(a) / fctm.max(1.0)),
+            square,
+            ..Held::default()
         }
     }
 }
