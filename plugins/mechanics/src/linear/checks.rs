@@ -143,11 +143,10 @@ fn what_stands_on_a_support_that_moves_is_carried_with_it() {
     near(far, 0.5 * (2.0 - (2.0 * pace).sin() / pace), 1e-3);
 }
 
-/// The bar that swings as its modes do, by the equations themselves: without dissipation the mean of
-/// its end over the time of a wave is where it is held at rest. And damped by its mass alone, thrown
-/// as one body, it slows down by e^(−αt).
+/// The same bar by the equations themselves, with all its modes: at rest again at 2 L/M. And damped by
+/// its mass alone, thrown as one body, it slows down by e^(−αt).
 #[test]
-fn a_bar_swings_in_time_as_its_modes_do() {
+fn a_bar_swings_in_time() {
     let modulus = E * 0.7 / (1.3 * 0.4);
     let back = 2.0 * (3.0 / modulus).sqrt();
     let held = bar(1.0, 8, 0.3, "C3D20") + "*BOUNDARY\nLOW,1\nALL,2,3\n";
@@ -156,12 +155,9 @@ fn a_bar_swings_in_time_as_its_modes_do() {
         let deck = format!("{held}*STEP\n*DYNAMIC,{way}\n{:?},{back:?}\n{load}", back / 80.0);
         *solve(&deck)[0].displacements.last().unwrap()
     };
-    // Of all modes together the end goes to 2 L/M and no farther; a kink rounded by increments.
+    // A kink that increments, given or chosen, round.
     near(moved("DIRECT,ALPHA=0.").x * modulus, 2.0, 0.05);
-    let modes = solve(&format!(
-        "{held}*STEP\n*FREQUENCY\n12\n*END STEP\n*STEP\n*MODAL DYNAMIC,DIRECT=NO\n.1,{back:?}\n{load}"
-    ));
-    near(moved("ALPHA=0.").x * modulus, modes[1].displacements.last().unwrap().x * modulus, 0.06);
+    near(moved("ALPHA=0.").x * modulus, 2.0, 0.05);
     let thrown = bar(1.0, 1, 1.0, "C3D20")
         .replace("*DENSITY", "*DAMPING,ALPHA=2.,BETA=0.\n*DENSITY")
         + "*BOUNDARY\nALL,2,3\n*STEP\n*DYNAMIC,DIRECT,ALPHA=0.\n.001,1.\n*DLOAD\nALL,GRAV,1.,1.,0.,0.\n*END STEP\n";
@@ -220,7 +216,7 @@ fn a_cantilever_bends_as_the_elastica() {
     let loads: String = (321..=328)
         .map(|n| format!("{n},3,{:?}\n", if n <= 324 { corner } else { middle }))
         .collect();
-    let deck = bar(length, 16, width, "C3D20R")
+    let deck = bar(length, 16, width, "C3D20")
         + &format!(
             "*BOUNDARY\nLOW,1,3\n*STEP,NLGEOM\n*STATIC\n*CLOAD\n{loads}*END STEP\n*STEP\n*STATIC\n*CLOAD,OP=NEW\n*END STEP\n"
         );
@@ -269,7 +265,7 @@ fn bodies_turn_far_without_stress() {
 #[test]
 fn beams_roll_up_under_a_moment() {
     let deck = "*NODE\n10,0,0,0\n20,.2,0,0\n30,.4,0,0\n4,.6,0,0\n5,.8,0,0\n\
-                *ELEMENT,TYPE=B32R,ELSET=ALL\n3,10,20,30\n5,30,4,5\n*MATERIAL,NAME=M\n*ELASTIC\n210000.,0.\n\
+                *ELEMENT,TYPE=B32,ELSET=ALL\n3,10,20,30\n5,30,4,5\n*MATERIAL,NAME=M\n*ELASTIC\n210000.,0.\n\
                 *BEAM SECTION,MATERIAL=M,ELSET=ALL,SECTION=RECT\n.03,.015\n0.,0.,1.\n\
                 *BOUNDARY\n10,1,6\n*STEP,NLGEOM\n*STATIC\n*CLOAD\n5,6,MOMENT\n*END STEP\n";
     let angle = 0.5f64;
