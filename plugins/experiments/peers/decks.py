@@ -20,6 +20,8 @@ import tempfile
 from pathlib import Path
 
 AGREES = 1e-4
+# Seconds that a deck may take us.
+LONG = 300
 PRINTS = ("CONTROLS", "NODEPRINT", "ELPRINT", "NODEFILE", "ELFILE", "CONTACTFILE", "CONTACTPRINT", "SECTIONPRINT", "FACEPRINT", "NODEOUTPUT", "ELEMENTOUTPUT")
 NODES, POINTS = "*NODE PRINT,NSET=ZZALL,GLOBAL=YES,FREQUENCY=100000", "*EL PRINT,ELSET=ZZALL,GLOBAL=YES,FREQUENCY=100000"
 # How far CalculiX goes on where displacements are large: of itself it is content with half a per cent of the forces.
@@ -141,7 +143,10 @@ def of_members(deck, out):
 
 def ours(program, deck, out):
     """The same by us; the line that we refuse it with."""
-    ran = subprocess.run([program, "analyze", deck, "--units", "m,N", "--out", out, "--quiet"], capture_output=True, text=True, timeout=600)
+    try:
+        ran = subprocess.run([program, "analyze", deck, "--units", "m,N", "--out", out, "--quiet"], capture_output=True, text=True, timeout=LONG)
+    except subprocess.TimeoutExpired:
+        return None, f"{deck.name}: not done in {LONG} s"
     if ran.returncode not in (0, 4) or not (out / "analyze.json").exists():
         lines = ran.stderr.strip().splitlines() or ["it ends with no word"]
         return None, lines[-1].replace(str(deck), deck.name)
