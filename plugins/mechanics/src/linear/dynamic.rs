@@ -8,7 +8,7 @@ use intrados_stage::Job;
 
 use super::{
     element::Folded,
-    large::{about, ends, of_element, settled, started, unbalanced},
+    large::{Settled, about, ends, of_element, settled, started, unbalanced},
     model::{Deck, Procedure, Step},
     plastic::Flow,
     solve::{LinearError, Loads, Past, Solved, System, unknowns},
@@ -241,7 +241,7 @@ impl Course<'_> {
             *forces.entry(at).or_default() -= alpha * force;
         }
         let found = settled(&from.place, |all| self.system(&now, all), fill, &forces, job)?;
-        let Some(place) = found else { return Ok(None) };
+        let Some(Settled { all: place, .. }) = found else { return Ok(None) };
         let each = |all: &[f64], of: &dyn Fn(u32, f64) -> f64| -> Vec<f64> {
             (0..).zip(all).map(|(u, &value)| of(u, value)).collect()
         };

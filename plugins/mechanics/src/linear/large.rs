@@ -52,18 +52,24 @@ fn moved(
     let way = Way::new(deck, step, past)?;
     let (mut all, mut share, mut part) = (way.start.clone(), 0.0, 1.0);
     let (mut stresses, mut flow) = (Vec::new(), past.flow.clone());
+    let mut unstable = 0;
     while share < 1.0 {
         job.step((1e4 * share) as usize, 10_000)?;
         let next = f64::min(1.0, share + part);
         if let Some(found) = way.settled(next, &all, &flow, job)? {
-            (stresses, flow) = ends(&way.still, &found, &flow)?;
-            (all, share, part) = (found, next, 2.0 * part);
+            (stresses, flow) = ends(&way.still, &found.all, &flow)?;
+            unstable = found.unstable;
+            (all, share, part) = (found.all, next, 2.0 * part);
         } else if part > LEAST {
             part *= 0.5;
         } else {
             let what = "large displacements";
             return Err(LinearError::NotConverged { step: step.name.clone(), what });
         }
+    }
+    if unstable > 0 {
+        let name = &step.name;
+        tracing::warn!("{name}: in {unstable} directions nothing holds it where it has come to");
     }
     let solved = way.system(1.0, &all)?.told(step.name.clone(), &all, stresses);
     Ok((all, flow, solved))
@@ -140,7 +146,7 @@ impl<'a> Way<'a> {
         from: &[f64],
         flow: &[Vec<Flow>],
         job: &Job,
-    ) -> Result<Option<Vec<f64>>, LinearError> {
+    ) -> Result<Option<Settled>, LinearError> {
         let forces = self.step.forces.iter().map(|(&at, force)| (at, share * force)).collect();
         let fill = |system: &System<'_>, all: &[f64], e: usize, k: &mut [f64], f: &mut [f64]| {
             let flow = of_element(flow, e);
@@ -152,6 +158,15 @@ impl<'a> Way<'a> {
     }
 }
 
+/// Where Newton's method has come to.
+pub(super) struct Settled {
+    /// Displacements of every unknown.
+    pub(super) all: Vec<f64>,
+    /// In how many directions nothing holds it there: it buckles, or elements of reduced integration
+    /// move without strain.
+    unstable: usize,
+}
+
 /// Newton's method: displacements at which what `fill` says of elements is in balance with forces at
 /// nodes; none where they do not settle. `about` gives the unknowns with what constraints ask for
 /// beyond displacements.
@@ -161,7 +176,7 @@ pub(super) fn settled<'a>(
     fill: impl Fn(&System<'a>, &[f64], usize, &mut [f64], &mut [f64]) -> Result<(), Folded> + Sync,
     forces: &BTreeMap<(u32, u8), f64>,
     job: &Job,
-) -> Result<Option<Vec<f64>>, LinearError> {
+) -> Result<Option<Settled>, LinearError> {
     let largest = |all: &[f64]| all.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
     let mut all = from.to_vec();
     for _ in 0..STEPS {
@@ -195,7 +210,7 @@ pub(super) fn settled<'a>(
             return Ok(None);
         }
         if moved <= SETTLED * largest(from).max(largest(&all)) {
-            return Ok((negative == 0).then_some(all));
+            return Ok(Some(Settled { all, unstable: negative }));
         }
     }
     Ok(None)
