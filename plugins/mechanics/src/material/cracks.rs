@@ -553,9 +553,12 @@ impl Concrete {
         let lost = Lost {
             damage: std::array::from_fn(|i| before.damage[i].max(laws[i].damage(kappa[i]))),
             across: std::array::from_fn(|i| {
-                let [now, late] = [false, true].map(|lasted| laws[i].across(kappa[i], lasted));
-                let now = before.across[i].max(now);
-                now + point.lasting * (late - now).max(0.0)
+                let across = |lasted| laws[i].across(kappa[i], lasted);
+                let now = before.across[i].max(across(false));
+                match point.lasting > 0.0 {
+                    true => now + point.lasting * (across(true) - now).max(0.0),
+                    false => now,
+                }
             }),
         };
         let shear = 0.5 * e / ((1.0 + nu) * (1.0 + point.creep));

@@ -24,12 +24,13 @@ fn scene(axial: f64) -> String {
     let support = BEYOND / long;
     let [from, to] = [-PLATE, PLATE].map(|by| (BEYOND + ARM + by) / long);
     let fck = FCM - 8.0;
+    let bond = if std::env::var_os("EXPERIMENT_BOND").is_some() { "bond: Slip, " } else { "" };
     format!(
         r#"(schema: "intrados.scene/1", title: "N and M",
         concretes: [(name: "tested", fck_mpa: {fck}, fcm_mpa: {FCM})],
         members: [(id: "C", concrete: "tested", at: (0, 0, 0), body: Beam(
             section: Rectangle(width_m: {SIDE}, depth_m: {SIDE}), length_m: {long},
-            reinforcement: (cover_mm: 32, bars: [
+            reinforcement: (cover_mm: 32, {bond}bars: [
                 Row(side_deg: 0, count: 3, diameter_mm: 20),
                 Row(side_deg: 0, count: 2, diameter_mm: 20, inset_mm: 150),
                 Row(side_deg: 180, count: 3, diameter_mm: 20),
