@@ -51,8 +51,7 @@ pub(super) fn solve(
             None => count = MANY,
         }
         if count >= MANY {
-            let what = "displacements of an increment";
-            return Err(LinearError::NotConverged { step: step.name.clone(), what });
+            return Err(LinearError::unsettled(step, "displacements of an increment"));
         }
     }
     let now = step.at(duration);

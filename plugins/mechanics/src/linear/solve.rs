@@ -127,6 +127,13 @@ pub enum LinearError {
     Cancelled(#[from] Cancelled),
 }
 
+impl LinearError {
+    /// What a step does not come to an end with.
+    pub(super) fn unsettled(step: &Step, what: &'static str) -> Self {
+        Self::NotConverged { step: step.name.clone(), what }
+    }
+}
+
 /// ‖f − K u‖ / ‖f‖ of a solution: slender solids of millions of entries lose six digits of sixteen,
 /// and a part that nothing holds all of them.
 const TOLERANCE: f64 = 1e-6;
@@ -444,11 +451,10 @@ impl<'a> System<'a> {
         count: usize,
         job: &Job,
     ) -> Result<Vec<Mode>, LinearError> {
-        let step = self.step.name.clone();
         modes::smallest(stiffness, other, count, job).map_err(|failed| match failed {
             modes::Failed::Solve(error) => self.explained(error),
-            modes::Failed::Indefinite => LinearError::Unstable { step },
-            modes::Failed::NotConverged => LinearError::NotConverged { step, what: "eigenvalues" },
+            modes::Failed::Indefinite => LinearError::Unstable { step: self.step.name.clone() },
+            modes::Failed::NotConverged => LinearError::unsettled(self.step, "eigenvalues"),
         })
     }
 
