@@ -95,15 +95,6 @@ impl<'a> Element<'a> {
         }
     }
 
-    /// Those for masses.
-    fn mass_points(&self) -> Vec<Point> {
-        if self.cell.points.is_empty() {
-            self.cell.shape.fine_points()
-        } else {
-            self.cell.points.clone()
-        }
-    }
-
     /// Material and axes at a point of integration.
     fn matter(&self, point: usize) -> (&Material, Option<&Orientation>) {
         match self.cell.layers.get(point) {
@@ -457,10 +448,17 @@ impl<'a> Element<'a> {
         }
     }
 
-    /// ∫ ρ N Nᵀ, row by row, with points enough for the square of its functions.
-    pub(super) fn mass(&self, warmth: &Warmth, m: &mut [f64]) -> Result<(), Folded> {
+    /// ∫ ρ N Nᵀ, row by row, by the points that `of` says of its shape where it has none of its own.
+    pub(super) fn mass(
+        &self,
+        of: impl Fn(Shape) -> Vec<Point>,
+        warmth: &Warmth,
+        m: &mut [f64],
+    ) -> Result<(), Folded> {
         let n = self.places.len();
-        for (natural, weight) in self.mass_points() {
+        let own = &self.cell.points;
+        let points = if own.is_empty() { of(self.cell.shape) } else { own.clone() };
+        for (natural, weight) in points {
             let at = self.at(natural, weight)?;
             let density = self.density(at.value(&warmth.now));
             for (a, b) in pairs(n) {

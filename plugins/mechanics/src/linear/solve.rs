@@ -14,6 +14,7 @@ use super::{
     model::{Deck, Procedure, Pull, Spring, Step},
     modes::{self, Mode},
     plastic::Flow,
+    shape::Shape,
     vibrate,
 };
 use crate::{
@@ -349,7 +350,10 @@ impl<'a> System<'a> {
     fn mass(&self, job: &Job) -> Result<(BlockMatrix<1>, Vec<f64>), LinearError> {
         let cells = self.deck.cells.len();
         self.assembled(job, |e, m, _| {
-            if e < cells { self.element(e).mass(&self.warmth(e), m) } else { Ok(()) }
+            if e >= cells {
+                return Ok(());
+            }
+            self.element(e).mass(Shape::fine_points, &self.warmth(e), m)
         })
     }
 
