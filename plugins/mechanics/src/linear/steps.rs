@@ -11,7 +11,7 @@ use super::{
     link::Link,
     matter::all_numbers,
     model::{Course, Damping, Heated, Material, Procedure, Pull, Step},
-    read::{Kind, Reader, Surface, plain},
+    read::{Kind, Raw, Reader, Surface, plain},
     shape::Shape,
     thin::Thin,
     tie::{self, Face},
@@ -519,9 +519,16 @@ impl Reader {
         Ok(Some(name))
     }
 
+    /// Nodes of planes where some are axially symmetric: all of them are in the slice then.
     pub(super) fn around_nodes(&self) -> BTreeSet<u32> {
+        let flat = |r: &&Raw| self.is_around() && matches!(r.kind, Kind::Flat(_));
+        self.raw.iter().filter(flat).flat_map(|r| r.nodes.iter().copied()).collect()
+    }
+
+    /// Whether a slice stands for what is axially symmetric.
+    pub(super) fn is_around(&self) -> bool {
         let around = |kind| matches!(kind, Kind::Flat(flat) if flat.plane == Plane::Around);
-        self.raw.iter().filter(|r| around(r.kind)).flat_map(|r| r.nodes.iter().copied()).collect()
+        self.raw.iter().any(|r| around(r.kind))
     }
 
     fn dload(&mut self, card: &Card<'_>, state: &mut State, on_surface: bool) -> Result<(), Fault> {
