@@ -207,6 +207,25 @@ fn cubes_stretch_far_as_green_and_kirchhoff_say() {
     solved[0].stresses.iter().flatten().flatten().for_each(|s| near(*s, 0.0, 1e-7));
 }
 
+/// A cube of rubber that is held across, one of foam, and one of Ramberg's and Osgood's curve.
+#[test]
+fn cubes_of_rubber_and_foam_are_pulled_as_their_laws_say() {
+    let pulled = |law: &str, held: &str| {
+        let steps = "*STEP,NLGEOM\n*STATIC\n*BOUNDARY\nHIGH,1,1,.2\n*END STEP\n";
+        let deck = cube(&format!("{held}{steps}")).replace("*ELASTIC\n200.,.3\n", law);
+        solve(&deck)[0].stresses[0][0][0]
+    };
+    let long = 1.2f64;
+    let rubber = pulled("*HYPERELASTIC,NEO HOOKE\n10.,.1\n", "*BOUNDARY\nALL,2,3\n");
+    let shape = long.powf(4.0 / 3.0) - long.powf(-2.0 / 3.0);
+    near(rubber, 40.0 / 3.0 * shape / long + 20.0 * (long - 1.0), 1e-6);
+    let foam = pulled("*HYPERFOAM\n3.,5.,0.\n", "");
+    near(foam, 6.0 / 5.0 * (long.powi(5) - 1.0) / long, 1e-6);
+    let curve = pulled("*DEFORMATION PLASTICITY\n200.,.3,2.,5.,.4\n", "");
+    let almansi = 0.5 * (1.0 - 1.0 / (long * long));
+    near(curve + 0.4 * (curve / 2.0).powi(4) * curve, 200.0 * almansi, 1e-4);
+}
+
 /// A cantilever under P L²/EI = 2: down by .49346 L and back by .16064 L (Mattiasson 1981); and back
 /// to where it was once the force is gone.
 #[test]

@@ -301,9 +301,13 @@ impl<'a> Element<'a> {
         let half = |a: DVec3| 0.5 * (a.length_squared() - 1.0);
         let strain = [half(x), half(y), half(z), x.dot(y), y.dot(z), z.dot(x)];
         let flow = flow.get(p).copied().unwrap_or_default();
-        let (stress, law, flow) = match metal {
-            Some(metal) => metal.tangent(&strain, &flow).ok_or(Folded)?,
-            None => (tensor::apply(&law, &strain), law, flow),
+        let (stress, law, flow) = match (metal, &self.matter(p).0.finite) {
+            (Some(metal), _) => metal.tangent(&strain, &flow).ok_or(Folded)?,
+            (None, Some(finite)) => {
+                let (stress, law) = finite.tangent(&strain).ok_or(Folded)?;
+                (stress, law, flow)
+            }
+            (None, None) => (tensor::apply(&law, &strain), law, flow),
         };
         let stress = tensor::add(&stress, &initial(p));
         Ok(Stretched { at, law, axes: [x, y, z], volume, stress, flow })

@@ -283,8 +283,17 @@ impl Reader {
         };
         let heats =
             matches!(procedure, Procedure::Heat { .. } | Procedure::Modes { heat: true, .. });
+        let may_be_large = matches!(procedure, Procedure::Static | Procedure::Dynamic { .. });
         if !heats {
-            lacks(|m| m.elastic.is_some(), "*ELASTIC")?;
+            let has: fn(&Material) -> bool = if state.large && may_be_large {
+                |m| m.elastic.is_some() || m.finite.is_some()
+            } else {
+                |m| m.elastic.is_some()
+            };
+            lacks(
+                has,
+                "*ELASTIC, nor with NLGEOM *HYPERELASTIC, *HYPERFOAM or *DEFORMATION PLASTICITY",
+            )?;
             let flows = match procedure {
                 Procedure::Static | Procedure::Dynamic { .. } => state.large,
                 other => matches!(other, Procedure::Modes { .. }),
@@ -307,7 +316,6 @@ impl Reader {
                 return Err(Fault::at(line, "a *TEMPERATURE in a *DYNAMIC step is not computed"));
             }
         }
-        let may_be_large = matches!(procedure, Procedure::Static | Procedure::Dynamic { .. });
         if state.large && may_be_large {
             return self.turns();
         }
