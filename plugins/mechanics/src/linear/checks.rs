@@ -119,6 +119,15 @@ fn dashpots_slow_down_what_swings() {
     near(shaken[2].displacements[12].x, -0.2 / 0.85, 2e-2);
 }
 
+/// A block that nothing holds, of which two modes are known, falls by g t²/2.
+#[test]
+fn what_nothing_holds_falls() {
+    let deck = bar(1.0, 1, 1.0, "C3D20")
+        + "*BOUNDARY\nALL,2,3\n*STEP\n*FREQUENCY\n2\n*END STEP\n\
+           *STEP\n*MODAL DYNAMIC\n.5,2.\n*DLOAD\nALL,GRAV,3.,1.,0.,0.\n*END STEP\n";
+    near(solve(&deck)[1].displacements[12].x, 6.0, 1e-5);
+}
+
 /// A spring that is soft from 1 m on, pulled along itself by 11 N.
 #[test]
 fn springs_follow_their_table_and_turn() {
