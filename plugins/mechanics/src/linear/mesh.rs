@@ -190,7 +190,14 @@ impl Reader {
                 continue;
             }
             for word in row.fields().filter(|w| !w.is_empty()) {
-                set.extend(self.some_nodes(word, row)?);
+                match label(word).ok().filter(|&number| self.nodes.get(number).is_none()) {
+                    // Sets that only results are asked of often name what is not there.
+                    Some(number) => self.deck.notes.push(format!(
+                        "line {}: node {number} is not defined, and the set goes without it",
+                        row.line
+                    )),
+                    None => set.extend(self.some_nodes(word, row)?),
+                }
             }
         }
         join(self.node_sets.entry(card.need("NSET")?).or_default(), set);
