@@ -6,7 +6,7 @@ FOLDER holds .inp files, such as CalculiX' own (Debian: calculix-ccx-test, unpac
 `ccx` is looked for in PATH, or named by CCX. What a deck prints is replaced by displacements of all nodes and stresses at all points at the end of every step,
 in global axes, in steps of vibrations at every frequency; by temperatures of all nodes in steps of heat; eigenvalues are those of the list that CalculiX writes. A deck agrees where the largest difference
 over the largest value is at most 1e-4, for displacements, for stresses and for temperatures, in every step, and where every eigenvalue differs by at most 1e-4 of
-itself. CalculiX writes seven digits. Where its stresses are at other points than ours only displacements are compared, and the table says so.
+itself. Values that are nothing but rounding agree: stresses below those of a strain of 1e-10. CalculiX writes seven digits. Where its stresses are at other points than ours only displacements are compared, and the table says so.
 """
 
 import base64
@@ -20,6 +20,8 @@ import tempfile
 from pathlib import Path
 
 AGREES = 1e-4
+# Strain whose stress is nothing.
+NOTHING_STRAINED = 1e-10
 # Seconds that a deck may take us.
 LONG = 300
 PRINTS = ("CONTROLS", "NODEPRINT", "ELPRINT", "NODEFILE", "ELFILE", "CONTACTFILE", "CONTACTPRINT", "SECTIONPRINT", "FACEPRINT", "NODEOUTPUT", "ELEMENTOUTPUT")
@@ -168,12 +170,24 @@ def ours(program, deck, out):
     return tables, ""
 
 
-def apart(a, b):
+def stiffest(deck):
+    """The largest constant of *ELASTIC, of which a stress is a part that is small or is not."""
+    most, inside = 0.0, False
+    for line in deck.read_text(errors="replace").splitlines():
+        if line.startswith("*"):
+            inside = keyword(line) == "ELASTIC" if keyword(line) else inside
+        elif inside:
+            most = max([most, *(float(w) for w in re.findall(r"[-+\d.]+(?:[EeDd][-+]?\d+)?", line.upper().replace("D", "E")))])
+    return most
+
+
+def apart(a, b, least=0.0):
     """The largest difference over the largest value, or nothing where they are not of the same points."""
     keys = a.keys() & b.keys()
     if not keys or len(keys) < len(a):
         return None
     size = max((abs(v) for k in keys for v in a[k]), default=0.0)
+    size = max(size, least)
     most = max(abs(x - y) for k in keys for x, y in zip(a[k], b[k]))
     return most / size if size > 0 else most
 
@@ -186,12 +200,13 @@ def aside(a, b):
     return max(abs(v[0] - b[k][0]) / max(abs(v[0]), floor) for k, v in a.items())
 
 
-def compared(found, given):
+def compared(found, given, stiff):
     """The largest difference of every kind over the steps; none where it cannot be compared."""
+    least = {"stresses": NOTHING_STRAINED * stiff}
     worst = {}
     for kind in KINDS:
         a, b = given[kind], found[kind]
-        each = [(aside if kind == "eigenvalues" else apart)(x, y) for x, y in zip(a[-len(b) :], b)]
+        each = [aside(x, y) if kind == "eigenvalues" else apart(x, y, least.get(kind, 0.0)) for x, y in zip(a[-len(b) :], b)]
         whole = len(a) >= len(b) > 0 and None not in each
         worst[kind] = max(each) if whole else None
     return worst
@@ -206,7 +221,7 @@ def row(program, peer, deck):
         given, complaint = theirs(peer, deck, room, found)
         if given is None:
             return [deck.name, "read", "", "", "", "", f"CalculiX: {complaint}"]
-        worst = compared(found, given)
+        worst = compared(found, given, stiffest(deck))
         wanted = [kind for kind in KINDS if found[kind]]
         # Of beams and shells of members stresses are at other points.
         idle = [kind for kind in wanted if kind == "stresses" and worst[kind] is None]

@@ -11,6 +11,7 @@ use super::{
     large::{Settled, about, ends, of_element, settled, started, unbalanced},
     model::{Deck, Procedure, Step},
     plastic::Flow,
+    shape::Shape,
     solve::{LinearError, Loads, Past, Solved, System, unknowns},
 };
 use crate::sparse::{Constraints, Method, solve as direct};
@@ -21,6 +22,9 @@ const ACCURACY: f64 = 1e-4;
 const MANY: usize = 1_000_000;
 /// ‖f − M a‖ / ‖f‖ of accelerations at the beginning.
 const TOLERANCE: f64 = 1e-7;
+/// Part of the first increment in which what begins suddenly sets in: motions that are faster do not
+/// take it up.
+const SUDDEN: f64 = 0.1;
 
 /// The end of a step of motion.
 pub(super) fn solve(
@@ -33,7 +37,7 @@ pub(super) fn solve(
         return Ok(Solved::default());
     };
     let course = Course { deck, step, past, alpha };
-    let mut state = course.begun(job)?;
+    let mut state = course.begun(SUDDEN * increment, job)?;
     let (mut long, mut count) = (increment, 0);
     while state.time < duration * (1.0 - 1e-9) {
         job.step((1e4 * state.time / duration) as usize, 10_000)?;
@@ -51,8 +55,7 @@ pub(super) fn solve(
             None => count = MANY,
         }
         if count >= MANY {
-            let what = "displacements of an increment";
-            return Err(LinearError::NotConverged { step: step.name.clone(), what });
+            return Err(LinearError::unsettled(step, "displacements of an increment"));
         }
     }
     let now = step.at(duration);
@@ -136,7 +139,7 @@ impl Course<'_> {
         }
         if is_element {
             let element = system.element(e);
-            element.mass(&system.warmth(e), &mut own.mass)?;
+            element.mass(Shape::finest_points, &system.warmth(e), &mut own.mass)?;
             let [mass, stiffness] = element.material().damping;
             let parts = own.mass.iter().zip(&own.stiffness);
             own.damping = parts.map(|(m, k)| mass * m + stiffness * k).collect();
@@ -149,8 +152,14 @@ impl Course<'_> {
         Ok(own)
     }
 
-    /// The beginning, with the acceleration that forces then give.
-    fn begun(&self, job: &Job) -> Result<State, LinearError> {
+    /// β and γ of Newmark's method.
+    fn weights(&self) -> [f64; 2] {
+        [0.25 * (1.0 - self.alpha) * (1.0 - self.alpha), 0.5 - self.alpha]
+    }
+
+    /// The beginning, with the acceleration that forces then give by the method itself, from none
+    /// before, after so short a time: M a = r where all of M moves slowly against that.
+    fn begun(&self, sudden: f64, job: &Job) -> Result<State, LinearError> {
         let place = started(self.deck, self.past);
         let mut speed = self.past.speeds.clone();
         speed.resize(place.len(), 0.0);
@@ -162,9 +171,11 @@ impl Course<'_> {
         let of = |e: usize, all: &[f64]| -> Vec<f64> {
             self.unknowns(e).into_iter().map(|u| all[u as usize]).collect()
         };
+        let holds = (1.0 + self.alpha) * self.weights()[0] * sudden * sudden;
         let (mass, mut rhs) = system.assembled(job, |e, m, f| {
             let own = self.own((&system, &loads), e, [&of(e, &place), &of(e, &speed)], &flow)?;
-            m.copy_from_slice(&own.mass);
+            let parts = own.mass.iter().zip(&own.stiffness);
+            m.iter_mut().zip(parts).for_each(|(all, (m, k))| *all = m + holds * k);
             f.copy_from_slice(&own.open);
             Ok(())
         })?;
@@ -204,7 +215,7 @@ impl Course<'_> {
         let time = from.time + long;
         let now = self.step.at(time);
         let alpha = self.alpha;
-        let (beta, gamma) = (0.25 * (1.0 - alpha) * (1.0 - alpha), 0.5 - alpha);
+        let [beta, gamma] = self.weights();
         let acceleration = |u: u32, place: f64| {
             let u = u as usize;
             let drift = from.place[u] + long * from.speed[u];

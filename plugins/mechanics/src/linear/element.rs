@@ -95,15 +95,6 @@ impl<'a> Element<'a> {
         }
     }
 
-    /// Those for masses.
-    fn mass_points(&self) -> Vec<Point> {
-        if self.cell.points.is_empty() {
-            self.cell.shape.fine_points()
-        } else {
-            self.cell.points.clone()
-        }
-    }
-
     /// Material and axes at a point of integration.
     fn matter(&self, point: usize) -> (&Material, Option<&Orientation>) {
         match self.cell.layers.get(point) {
@@ -310,9 +301,13 @@ impl<'a> Element<'a> {
         let half = |a: DVec3| 0.5 * (a.length_squared() - 1.0);
         let strain = [half(x), half(y), half(z), x.dot(y), y.dot(z), z.dot(x)];
         let flow = flow.get(p).copied().unwrap_or_default();
-        let (stress, law, flow) = match metal {
-            Some(metal) => metal.tangent(&strain, &flow).ok_or(Folded)?,
-            None => (tensor::apply(&law, &strain), law, flow),
+        let (stress, law, flow) = match (metal, &self.matter(p).0.finite) {
+            (Some(metal), _) => metal.tangent(&strain, &flow).ok_or(Folded)?,
+            (None, Some(finite)) => {
+                let (stress, law) = finite.tangent(&strain).ok_or(Folded)?;
+                (stress, law, flow)
+            }
+            (None, None) => (tensor::apply(&law, &strain), law, flow),
         };
         let stress = tensor::add(&stress, &initial(p));
         Ok(Stretched { at, law, axes: [x, y, z], volume, stress, flow })
@@ -457,10 +452,17 @@ impl<'a> Element<'a> {
         }
     }
 
-    /// ∫ ρ N Nᵀ, row by row, with points enough for the square of its functions.
-    pub(super) fn mass(&self, warmth: &Warmth, m: &mut [f64]) -> Result<(), Folded> {
+    /// ∫ ρ N Nᵀ, row by row, by the points that `of` says of its shape where it has none of its own.
+    pub(super) fn mass(
+        &self,
+        of: impl Fn(Shape) -> Vec<Point>,
+        warmth: &Warmth,
+        m: &mut [f64],
+    ) -> Result<(), Folded> {
         let n = self.places.len();
-        for (natural, weight) in self.mass_points() {
+        let own = &self.cell.points;
+        let points = if own.is_empty() { of(self.cell.shape) } else { own.clone() };
+        for (natural, weight) in points {
             let at = self.at(natural, weight)?;
             let density = self.density(at.value(&warmth.now));
             for (a, b) in pairs(n) {

@@ -105,7 +105,7 @@ impl<'a> Body<'a> {
     }
 
     fn lost(&self, what: &'static str) -> LinearError {
-        LinearError::NotConverged { step: self.step.name.clone(), what }
+        LinearError::unsettled(self.step, what)
     }
 
     /// Temperatures that balance, from a guess; `before` is what they were, and how long ago, s.

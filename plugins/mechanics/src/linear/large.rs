@@ -63,8 +63,7 @@ fn moved(
         } else if part > LEAST {
             part *= 0.5;
         } else {
-            let what = "large displacements";
-            return Err(LinearError::NotConverged { step: step.name.clone(), what });
+            return Err(LinearError::unsettled(step, "large displacements"));
         }
     }
     if unstable > 0 {

@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 use glam::DVec3;
 
 use super::{
-    flat::{Flat, Plane, Sides, thicken},
+    flat::{Flat, Plane, SLICE, Sides, thicken},
     link::Link,
     model::Cell,
     read::{Kind, Raw, Reader, Section, Surface, plain},
@@ -190,7 +190,14 @@ impl Reader {
                 continue;
             }
             for word in row.fields().filter(|w| !w.is_empty()) {
-                set.extend(self.some_nodes(word, row)?);
+                match label(word).ok().filter(|&number| self.nodes.get(number).is_none()) {
+                    // Sets that only results are asked of often name what is not there.
+                    Some(number) => self.deck.notes.push(format!(
+                        "line {}: node {number} is not defined, and the set goes without it",
+                        row.line
+                    )),
+                    None => set.extend(self.some_nodes(word, row)?),
+                }
             }
         }
         join(self.node_sets.entry(card.need("NSET")?).or_default(), set);
@@ -269,6 +276,8 @@ impl Reader {
             return Err(Fault::at(raw.line, why));
         }
         self.ring()?;
+        // Beside what is axially symmetric, the slice has its share of a plane of some thickness.
+        let share = if self.is_around() { SLICE / 360.0 } else { 1.0 };
         let mut sides = Sides::new();
         for i in 0..self.raw.len() {
             let raw = &self.raw[i];
@@ -279,7 +288,8 @@ impl Reader {
                 Kind::Solid(shape) => whole(raw, shape, raw.nodes.clone(), section),
                 Kind::Flat(flat) => {
                     let deck = &mut self.deck;
-                    let nodes = thicken(deck, flat, &raw.nodes, section.thickness, &mut sides);
+                    let thickness = share * section.thickness;
+                    let nodes = thicken(deck, flat, &raw.nodes, thickness, &mut sides);
                     whole(raw, flat.shape, nodes, section)
                 }
             };

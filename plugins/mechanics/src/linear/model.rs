@@ -7,6 +7,7 @@ use glam::DVec3;
 use super::{
     constraint::Equation,
     curve::Curved,
+    finite::Finite,
     law::{Elastic, Expansion, Table},
     plastic::Hardening,
     shape::{Point, Shape},
@@ -124,6 +125,8 @@ pub(super) struct Material {
     pub(super) elastic: Option<Elastic>,
     pub(super) expansion: Option<Expansion>,
     pub(super) plastic: Option<Hardening>,
+    /// Its law where strains are not small, if it has no other.
+    pub(super) finite: Option<Finite>,
     /// kg/m³.
     pub(super) density: Option<Table<1>>,
     /// Along its own axes, W/(m·K).

@@ -5,17 +5,30 @@
 
 use nalgebra::Matrix3;
 
+use super::finite::{metric, slopes, voigt};
 use crate::{
     model::interpolate,
     tensor::{Tangent, Voigt},
 };
 
-/// How true stress at yield grows with plastic strain, and whether it moves the surface or widens it.
+/// How the surface of yield widens and moves with plastic strain: from 0 on, and true stress, Pa.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Hardening {
-    pub(super) kinematic: bool,
-    /// Plastic strain from 0 on, and Pa.
-    pub(super) table: Vec<(f64, f64)>,
+    pub(super) widens: Vec<(f64, f64)>,
+    /// Empty: it stays where it is.
+    pub(super) moves: Vec<(f64, f64)>,
+}
+
+impl Hardening {
+    /// Only widens.
+    pub(super) fn isotropic(table: Vec<(f64, f64)>) -> Self {
+        Self { widens: table, moves: Vec::new() }
+    }
+
+    /// Only moves, as wide as the table begins.
+    pub(super) fn kinematic(table: Vec<(f64, f64)>) -> Self {
+        Self { widens: table.iter().take(1).copied().collect(), moves: table }
+    }
 }
 
 /// What has flowed at a point.
@@ -38,8 +51,6 @@ impl Default for Flow {
 const STEPS: usize = 50;
 /// Part of the yield stress by which a stress may be beyond it.
 const BEYOND: f64 = 1e-10;
-/// Strain of a difference.
-const SMALL: f64 = 1e-7;
 
 /// A metal by Young's modulus and Poisson's ratio.
 pub(super) struct Metal<'a> {
@@ -54,39 +65,14 @@ impl Metal<'_> {
         let (stress, flowed) = self.stress(strain, flow, true)?;
         // What does not flow has the slopes of what is elastic, also where it is about to.
         let flows = flowed.strain > flow.strain;
-        let mut slopes = [[0.0; 6]; 6];
-        for j in 0..6 {
-            let at = |by: f64| {
-                let mut other = *strain;
-                other[j] += by;
-                Some(self.stress(&other, flow, flows)?.0)
-            };
-            let (up, down) = (at(SMALL)?, at(-SMALL)?);
-            // Their symmetric part, which is nearly all of them and what solvers take.
-            for i in 0..6 {
-                let half = 0.25 * (up[i] - down[i]) / SMALL;
-                slopes[i][j] += half;
-                slopes[j][i] += half;
-            }
-        }
+        let slopes = slopes(strain, |other| Some(self.stress(other, flow, flows)?.0))?;
         Some((stress, slopes, flowed))
     }
 
     fn stress(&self, strain: &Voigt, flow: &Flow, may_flow: bool) -> Option<(Voigt, Flow)> {
         let [young, poisson] = self.elastic;
         let (bulk, shear) = (young / 3.0 / (1.0 - 2.0 * poisson), young / 2.0 / (1.0 + poisson));
-        let e = strain;
-        let c = Matrix3::new(
-            1.0 + 2.0 * e[0],
-            e[3],
-            e[5],
-            e[3],
-            1.0 + 2.0 * e[1],
-            e[4],
-            e[5],
-            e[4],
-            1.0 + 2.0 * e[2],
-        );
+        let c = metric(strain);
         let square = c.determinant();
         let inverse = c.try_inverse().filter(|_| square > 0.0)?;
         let volume = square.sqrt();
@@ -143,26 +129,17 @@ impl Metal<'_> {
 
     /// True stress at the surface, seen from its middle.
     fn width(&self, strain: f64) -> f64 {
-        let at = if self.hardening.kinematic { 0.0 } else { strain };
-        interpolate(&self.hardening.table, at).unwrap_or(0.0)
+        interpolate(&self.hardening.widens, strain).unwrap_or(0.0)
     }
 
     /// How far its middle has gone, from any origin.
     fn moved(&self, strain: f64) -> f64 {
-        if !self.hardening.kinematic {
-            return 0.0;
-        }
-        interpolate(&self.hardening.table, strain).unwrap_or(0.0)
+        interpolate(&self.hardening.moves, strain).unwrap_or(0.0)
     }
 }
 
 /// √(2/3).
 const ROOT: f64 = 0.816_496_580_927_726;
-
-fn voigt(m: &Matrix3<f64>) -> Voigt {
-    let mean = |i: usize, j: usize| 0.5 * (m[(i, j)] + m[(j, i)]);
-    [m[(0, 0)], m[(1, 1)], m[(2, 2)], mean(0, 1), mean(1, 2), mean(2, 0)]
-}
 
 #[cfg(test)]
 mod tests {
@@ -189,19 +166,22 @@ mod tests {
     }
 
     /// A bar beyond yield, back and beyond it on the other side: bilinear, and yielding again after
-    /// twice the stress reached, or after twice the first.
+    /// twice the stress reached, after twice the first, or half way between where half of it moves.
     #[test]
     fn bars_follow_their_table_and_come_back() {
-        for kinematic in [false, true] {
-            let table = vec![(0.0, 800.0), (0.1, 1600.0)];
-            let hardening = Hardening { kinematic, table };
+        let table = vec![(0.0, 800.0), (0.1, 1600.0)];
+        let half = vec![(0.0, 800.0), (0.1, 1200.0)];
+        let slope = 210e3 * 8e3 / 218e3;
+        let bilinear = 800.0 + slope * (0.008 - 800.0 / 210e3);
+        for (hardening, range) in [
+            (Hardening::isotropic(table.clone()), 2.0 * bilinear),
+            (Hardening::kinematic(table), 1600.0),
+            (Hardening { widens: half.clone(), moves: half }, 800.0 + bilinear),
+        ] {
             let metal = metal(&hardening);
-            let slope = 210e3 * 8e3 / 218e3;
             let (up, flow) = pulled(&metal, 1.008, &Flow::default());
-            let bilinear = 800.0 + slope * (0.008 - 800.0 / 210e3);
             assert!((up / bilinear - 1.0).abs() < 0.01, "{up} is not {bilinear}");
             let (down, _) = pulled(&metal, 0.996, &flow);
-            let range = if kinematic { 1600.0 } else { 2.0 * bilinear };
             let expected = bilinear - range - slope * (0.012 - range / 210e3);
             assert!((down / expected - 1.0).abs() < 0.02, "{down} is not {expected}");
         }
@@ -212,7 +192,7 @@ mod tests {
     #[test]
     fn a_bar_at_three_per_cent_bears_as_that_of_calculix() {
         let table = vec![(0.0, 800.0), (0.1, 1600.0)];
-        let hardening = Hardening { kinematic: false, table };
+        let hardening = Hardening::isotropic(table);
         let (stress, flow) = pulled(&metal(&hardening), 1.0 + 0.227_984_1 / 8.0, &Flow::default());
         assert!((stress / 989.98 - 1.0).abs() < 1e-4, "{stress}");
         assert!((flow.strain - 0.023_748).abs() < 1e-5, "{}", flow.strain);
@@ -222,7 +202,7 @@ mod tests {
     #[test]
     fn slopes_are_differences() {
         let table = vec![(0.0, 800.0), (0.1, 1600.0)];
-        let hardening = Hardening { kinematic: true, table };
+        let hardening = Hardening::kinematic(table);
         let metal = metal(&hardening);
         for size in [1e-4, 1e-2] {
             let strain = [size, -0.3 * size, 0.2 * size, 0.7 * size, -0.4 * size, 0.1 * size];

@@ -14,6 +14,7 @@ use super::{
     model::{Deck, Procedure, Pull, Spring, Step},
     modes::{self, Mode},
     plastic::Flow,
+    shape::Shape,
     vibrate,
 };
 use crate::{
@@ -125,6 +126,13 @@ pub enum LinearError {
     /// Stopped.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
+}
+
+impl LinearError {
+    /// What a step does not come to an end with.
+    pub(super) fn unsettled(step: &Step, what: &'static str) -> Self {
+        Self::NotConverged { step: step.name.clone(), what }
+    }
 }
 
 /// ‖f − K u‖ / ‖f‖ of a solution: slender solids of millions of entries lose six digits of sixteen,
@@ -342,7 +350,10 @@ impl<'a> System<'a> {
     fn mass(&self, job: &Job) -> Result<(BlockMatrix<1>, Vec<f64>), LinearError> {
         let cells = self.deck.cells.len();
         self.assembled(job, |e, m, _| {
-            if e < cells { self.element(e).mass(&self.warmth(e), m) } else { Ok(()) }
+            if e >= cells {
+                return Ok(());
+            }
+            self.element(e).mass(Shape::fine_points, &self.warmth(e), m)
         })
     }
 
@@ -444,11 +455,10 @@ impl<'a> System<'a> {
         count: usize,
         job: &Job,
     ) -> Result<Vec<Mode>, LinearError> {
-        let step = self.step.name.clone();
         modes::smallest(stiffness, other, count, job).map_err(|failed| match failed {
             modes::Failed::Solve(error) => self.explained(error),
-            modes::Failed::Indefinite => LinearError::Unstable { step },
-            modes::Failed::NotConverged => LinearError::NotConverged { step, what: "eigenvalues" },
+            modes::Failed::Indefinite => LinearError::Unstable { step: self.step.name.clone() },
+            modes::Failed::NotConverged => LinearError::unsettled(self.step, "eigenvalues"),
         })
     }
 

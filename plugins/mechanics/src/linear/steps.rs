@@ -11,7 +11,7 @@ use super::{
     link::Link,
     matter::all_numbers,
     model::{Course, Damping, Heated, Material, Procedure, Pull, Step},
-    read::{Kind, Reader, Surface, plain},
+    read::{Kind, Raw, Reader, Surface, plain},
     shape::Shape,
     thin::Thin,
     tie::{self, Face},
@@ -283,8 +283,17 @@ impl Reader {
         };
         let heats =
             matches!(procedure, Procedure::Heat { .. } | Procedure::Modes { heat: true, .. });
+        let may_be_large = matches!(procedure, Procedure::Static | Procedure::Dynamic { .. });
         if !heats {
-            lacks(|m| m.elastic.is_some(), "*ELASTIC")?;
+            let has: fn(&Material) -> bool = if state.large && may_be_large {
+                |m| m.elastic.is_some() || m.finite.is_some()
+            } else {
+                |m| m.elastic.is_some()
+            };
+            lacks(
+                has,
+                "*ELASTIC, nor with NLGEOM *HYPERELASTIC, *HYPERFOAM or *DEFORMATION PLASTICITY",
+            )?;
             let flows = match procedure {
                 Procedure::Static | Procedure::Dynamic { .. } => state.large,
                 other => matches!(other, Procedure::Modes { .. }),
@@ -307,7 +316,6 @@ impl Reader {
                 return Err(Fault::at(line, "a *TEMPERATURE in a *DYNAMIC step is not computed"));
             }
         }
-        let may_be_large = matches!(procedure, Procedure::Static | Procedure::Dynamic { .. });
         if state.large && may_be_large {
             return self.turns();
         }
@@ -519,9 +527,16 @@ impl Reader {
         Ok(Some(name))
     }
 
+    /// Nodes of planes where some are axially symmetric: all of them are in the slice then.
     pub(super) fn around_nodes(&self) -> BTreeSet<u32> {
+        let flat = |r: &&Raw| self.is_around() && matches!(r.kind, Kind::Flat(_));
+        self.raw.iter().filter(flat).flat_map(|r| r.nodes.iter().copied()).collect()
+    }
+
+    /// Whether a slice stands for what is axially symmetric.
+    pub(super) fn is_around(&self) -> bool {
         let around = |kind| matches!(kind, Kind::Flat(flat) if flat.plane == Plane::Around);
-        self.raw.iter().filter(|r| around(r.kind)).flat_map(|r| r.nodes.iter().copied()).collect()
+        self.raw.iter().any(|r| around(r.kind))
     }
 
     fn dload(&mut self, card: &Card<'_>, state: &mut State, on_surface: bool) -> Result<(), Fault> {

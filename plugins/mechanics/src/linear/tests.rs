@@ -379,6 +379,9 @@ fn faults_are_named_with_their_lines() {
     let line = refusal(&good.replace("3,1,1.\n", "99,1,1.\n3,7,1.\n"));
     // A card ends at its first fault; the next card is read all the same.
     assert!(line.contains("node 99 is not defined"), "{line}");
+    let noted = good.replace("*STEP\n", "*NSET,NSET=ASKED\n3,99\n*STEP\n");
+    let deck = parse(noted.as_bytes(), Path::new("deck.inp"), Units::MetreNewton).unwrap();
+    assert!(deck.notes.iter().any(|n| n.contains("node 99 is not defined")), "{:?}", deck.notes);
     let line = refusal(&good.replace("200.,.3", "200.,.6").replace("*DENSITY\n3.", "*DENSITY\nx"));
     assert!(line.contains("Poisson") && line.contains("\"x\" is not a number"), "{line}");
     assert!(refusal(&good.replace("*END STEP\n", "")).contains("without *END STEP"));

@@ -25,7 +25,7 @@ pub(super) struct Modes {
     pub(super) state: Vec<[f64; 2]>,
 }
 
-/// Modes whose eigenvalue is less, over the largest, move freely.
+/// Modes whose eigenvalue is less, over the largest, are held by nothing.
 const FREE: f64 = 1e-9;
 /// Frequencies that differ by less of themselves are one.
 const SAME: f64 = 1e-6;
@@ -41,10 +41,6 @@ pub(super) fn solve(
     let still = System::new(deck, step, past)?;
     let others = || LinearError::OtherModes { step: step.name.clone() };
     let modes = past.modes.as_ref().filter(|m| m.order == still.free.order()).ok_or_else(others)?;
-    let largest = modes.all.last().map_or(0.0, |m| m.value);
-    if modes.all.iter().any(|m| m.value <= FREE * largest) {
-        return Err(still.floating());
-    }
     let part = |course| Part::new(deck, course, (&still, modes), past, job);
     let parts = step.courses.iter().map(part).collect::<Result<Vec<_>, _>>()?;
     let drags = drags(deck, &still, modes);
@@ -135,6 +131,13 @@ struct Swings<'a> {
 }
 
 impl Swings<'_> {
+    /// λ of a mode, 1/s²; nothing where nothing holds it.
+    fn square(&self, mode: usize) -> f64 {
+        let largest = self.modes.all.last().map_or(0.0, |m| m.value);
+        let own = self.modes.all[mode].value;
+        if own > FREE * largest { own } else { 0.0 }
+    }
+
     /// Damping of all modes together at a frequency, with that of dashpots, 1/s.
     fn damped(&self, frequency: f64) -> DMatrix<f64> {
         let n = self.modes.all.len();
@@ -155,7 +158,7 @@ impl Swings<'_> {
         let mut system = DMatrix::<f64>::zeros(2 * n + 2, 2 * n + 2);
         for i in 0..n {
             system[(i, n + i)] = time;
-            system[(n + i, i)] = -time * self.modes.all[i].value;
+            system[(n + i, i)] = -time * self.square(i);
             for j in 0..n {
                 system[(n + i, n + j)] = -time * damped[(i, j)];
             }
@@ -178,7 +181,7 @@ impl Swings<'_> {
         let damped = self.damped(frequency);
         let mut system = DMatrix::<f64>::zeros(2 * n, 2 * n);
         for i in 0..n {
-            let inert = self.modes.all[i].value - pace * pace;
+            let inert = self.square(i) - pace * pace;
             (system[(i, i)], system[(n + i, n + i)]) = (inert, inert);
             for j in 0..n {
                 system[(i, n + j)] = -pace * damped[(i, j)];
@@ -192,7 +195,7 @@ impl Swings<'_> {
 
     /// s of a mode, 1/s.
     fn damping(&self, mode: usize) -> f64 {
-        let square = self.modes.all[mode].value;
+        let square = self.square(mode);
         match &self.step.damping {
             Damping::None => 0.0,
             Damping::Rayleigh { mass, stiffness } => 0.5 * (mass + stiffness * square),
@@ -231,7 +234,7 @@ impl Swings<'_> {
             }
             for (i, own) in state.iter_mut().enumerate() {
                 let force = [before[i], (after[i] - before[i]) / length];
-                let mode = [self.modes.all[i].value, self.damping(i)];
+                let mode = [self.square(i), self.damping(i)];
                 *own = swung(*own, mode, force, length);
             }
             before = after;
@@ -284,7 +287,7 @@ impl Swings<'_> {
         let mut places = [Vec::new(), Vec::new()];
         let mut forces = Vec::with_capacity(self.modes.all.len());
         let resonance = || LinearError::Resonance { step: self.step.name.clone(), frequency };
-        for (i, mode) in self.modes.all.iter().enumerate() {
+        for i in 0..self.modes.all.len() {
             let mut force = [0.0; 2];
             for (part, factor) in self.parts.iter().zip(&factors) {
                 force[0] += factor * (part.forces[i] + pace * pace * part.inertia[i]);
@@ -294,9 +297,10 @@ impl Swings<'_> {
             if !self.drags.is_empty() {
                 continue;
             }
-            let resists = [mode.value - pace * pace, 2.0 * self.damping(i) * pace];
+            let held = self.square(i);
+            let resists = [held - pace * pace, 2.0 * self.damping(i) * pace];
             let square = resists[0] * resists[0] + resists[1] * resists[1];
-            if square.sqrt() <= FREE * mode.value {
+            if square.sqrt() <= FREE * held {
                 return Err(resonance());
             }
             places[0].push((force[0] * resists[0] + force[1] * resists[1]) / square);
@@ -335,6 +339,9 @@ fn swung(
     force: [f64; 2],
     time: f64,
 ) -> [f64; 2] {
+    if square == 0.0 {
+        return drifted([place, speed], 2.0 * damping, force, time);
+    }
     // It swings about where the force would hold it, which moves at this pace.
     let pace = force[1] / square;
     let rest = (force[0] - 2.0 * damping * pace) / square;
@@ -344,6 +351,34 @@ fn swung(
         rest + pace * time + cosine * place + sine * (speed + damping * place),
         pace + cosine * speed - sine * (damping * speed + square * place),
     ]
+}
+
+/// The same of what nothing holds, ẍ + d ẋ = f₀ + f₁ t.
+fn drifted([place, speed]: [f64; 2], drag: f64, force: [f64; 2], time: f64) -> [f64; 2] {
+    let [alone, once, twice, thrice] = fading(drag * time);
+    [
+        place + time * (once * speed + time * (twice * force[0] + thrice * time * force[1])),
+        alone * speed + time * (once * force[0] + twice * time * force[1]),
+    ]
+}
+
+/// φₖ = Σ (−z)ʲ/(j + k)!: e⁻ᶻ, and it integrated once, twice and three times.
+fn fading(z: f64) -> [f64; 4] {
+    if z > 1.0 {
+        let alone = (-z).exp();
+        let once = (1.0 - alone) / z;
+        let twice = (1.0 - once) / z;
+        return [alone, once, twice, (0.5 - twice) / z];
+    }
+    let terms = (4..24).scan(1.0 / 6.0, |term, j| {
+        let own = *term;
+        *term *= -z / f64::from(j);
+        Some(own)
+    });
+    let thrice: f64 = terms.sum();
+    let twice = 0.5 - z * thrice;
+    let once = 1.0 - z * twice;
+    [1.0 - z * once, once, twice, thrice]
 }
 
 /// e⁻ˢᵗ cos rt and e⁻ˢᵗ sin(rt)/r, r² = λ − s², also where that is below 0.
@@ -410,6 +445,24 @@ mod tests {
             let halves = swung(half, mode, [5.0, 5.0], 0.6);
             (0..2).for_each(|i| near(whole[i], halves[i], 1e-8));
         }
+    }
+
+    #[test]
+    fn what_nothing_holds_goes_on() {
+        let [place, speed] = swung([1.0, 2.0], [0.0, 0.0], [3.0, 6.0], 2.0);
+        near(place, 1.0 + 4.0 + 6.0 + 8.0, 1e-13);
+        near(speed, 2.0 + 6.0 + 12.0, 1e-13);
+        // ẍ + 2 s ẋ = 1 + t, by halves of the time on both sides of where the series ends.
+        for damping in [1e-9, 0.3, 0.6, 7.0] {
+            let mode = [0.0, damping];
+            let whole = swung([0.3, -1.0], mode, [1.0, 1.0], 1.0);
+            let half = swung([0.3, -1.0], mode, [1.0, 1.0], 0.5);
+            let halves = swung(half, mode, [1.5, 1.0], 0.5);
+            (0..2).for_each(|i| near(whole[i], halves[i], 1e-13));
+        }
+        // ẍ + 2 ẋ = 1 from rest.
+        let [place, _] = swung([0.0; 2], [0.0, 1.0], [1.0, 0.0], 1.0);
+        near(place, 0.5 - 0.25 * (1.0 - (-2.0f64).exp()), 1e-14);
     }
 
     /// CalculiX on its deck `beamdy8`: a mode at 13 096 Hz in 12 000 … 14 000, five points.
