@@ -58,6 +58,7 @@ pub(super) fn smallest(
         Ok(krylov) => krylov.smallest(count, job),
         Err(Failed::Solve(
             SolveError::Indefinite { .. }
+            | SolveError::Floating { .. }
             | SolveError::NoStiffness { .. }
             | SolveError::NotConverged { .. },
         )) if g.trace() > 0.0 => {

@@ -5,6 +5,8 @@ use std::{
     path::Path,
 };
 
+use glam::DVec3;
+
 use super::{
     flat::Flat,
     link::Link,
@@ -25,7 +27,7 @@ use crate::read::{
 /// Cards that are read, without their spaces.
 const KNOWN: &str = "NODE ELEMENT NSET ELSET SURFACE MATERIAL ELASTIC DENSITY EXPANSION \
     CONDUCTIVITY SPECIFICHEAT DAMPING PLASTIC SOLIDSECTION SHELLSECTION BEAMSECTION \
-    BEAMGENERALSECTION NODALTHICKNESS MEMBRANE ORIENTATION AMPLITUDE TRANSFORM EQUATION TIE \
+    BEAMGENERALSECTION NODALTHICKNESS NORMAL MEMBRANE ORIENTATION AMPLITUDE TRANSFORM EQUATION TIE \
     SPRING DASHPOT MPC RIGIDBODY DISTRIBUTINGCOUPLING PRE-TENSIONSECTION PHYSICALCONSTANTS \
     INITIALCONDITIONS BOUNDARY STEP STATIC DYNAMIC FREQUENCY BUCKLE HEATTRANSFER MODALDYNAMIC \
     STEADYSTATEDYNAMICS MODALDAMPING CLOAD DLOAD DSLOAD \
@@ -183,6 +185,8 @@ pub(super) struct Reader {
     pub(super) turning: HashMap<u32, u32>,
     /// What nodes of beams and shells become.
     pub(super) rings: Rings,
+    /// Normals of these that are given, by element and node.
+    pub(super) normals: HashMap<(u32, u32), DVec3>,
     /// W/(m²·K⁴).
     pub(super) boltzmann: Option<f64>,
     pub(super) tied: bool,
@@ -210,7 +214,8 @@ impl Reader {
             amplitudes: HashMap::new(),
             sprung: BTreeSet::new(),
             turning: HashMap::new(),
-            rings: HashMap::new(),
+            rings: Rings::default(),
+            normals: HashMap::new(),
             boltzmann: None,
             tied: false,
             equations: BTreeMap::new(),

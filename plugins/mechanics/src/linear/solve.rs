@@ -408,6 +408,7 @@ impl<'a> System<'a> {
     fn explained(&self, error: SolveError) -> LinearError {
         match error {
             SolveError::Indefinite { .. }
+            | SolveError::Floating { .. }
             | SolveError::NoStiffness { .. }
             | SolveError::NotConverged { .. } => self.floating(),
             other => other.into(),
