@@ -66,6 +66,14 @@ fn a_bar_vibrates_along_itself_as_waves_do() {
     }
 }
 
+/// Nothing holds it: six motions without strain, then what strains it.
+#[test]
+fn bodies_that_nothing_holds_vibrate() {
+    let deck = bar(1.0, 2, 0.3, "C3D20") + "*STEP\n*FREQUENCY\n7\n*END STEP\n";
+    let found = &solve(&deck)[0].eigenvalues;
+    assert!(found[5].abs() < 1e-6 * found[6], "{found:?}");
+}
+
 /// The same bar, pulled at its end by 1 Pa from rest: when a wave has come back, both of its modes
 /// are at their farthest, (16/π²)(1 + 1/9) L/M; as long after that they are back. Pulled at a
 /// frequency with damping: Σ 2/(ρL)/(ω² − Ω² + iαΩ).
