@@ -481,7 +481,7 @@ fn engineering(card: &Card<'_>, n: &[f64; 9]) -> Result<[f64; 9], Fault> {
 }
 
 /// Two points.
-fn six(card: &Card<'_>) -> Result<[DVec3; 2], Fault> {
+pub(super) fn six(card: &Card<'_>) -> Result<[DVec3; 2], Fault> {
     let mut rows = card.rows();
     let what = "two points: x, y, z, x, y, z";
     let row: Row<'_> = rows.next().ok_or_else(|| card.fault(format!("needed are {what}")))?;
