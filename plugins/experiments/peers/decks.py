@@ -95,6 +95,8 @@ def blocks(text):
             kind, into = begun, {}
             found[kind].append(into)
         elif into is not None and words and words[0].isdigit():
+            # Of sectors the number of nodal diameters stands before that of the mode.
+            words = words[1:] if kind == "eigenvalues" and words[1].isdigit() else words
             keys = 2 if kind == "stresses" else 1
             last = 2 if kind == "eigenvalues" else None
             into[tuple(map(int, words[:keys]))] = [number(w) for w in words[keys:last]]

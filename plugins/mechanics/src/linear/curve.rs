@@ -1,16 +1,17 @@
-//! Constraints that are linear only where displacements are small: bodies that turn as a whole,
-//! mean angles, nodes that stay in a plane or on a line. Each gives its equations about any
+//! Constraints that are linear only where displacements are small: bodies that turn as a whole and
+//! may widen, mean angles, nodes that stay in a plane or on a line. Each gives its equations about any
 //! displacements; those about none are the linear ones.
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
 use super::constraint::Equation;
 
 /// What binds nodes.
 #[derive(Debug, Clone)]
 pub(super) enum Curve {
-    /// u = u₀ + (R(θ) − 1)(x − x₀): the node of u₀, that of θ times a unit, and the others.
-    Body { reference: u32, turning: u32, unit: f64, nodes: Vec<u32> },
+    /// u = u₀ + (R(θ)(1 + Σ sₖ Sₖ) − 1)(x − x₀): the node of u₀, that of θ times a unit, the others,
+    /// and in which ways Sₖ they widen, each with the unknown that sₖ is.
+    Body { reference: u32, turning: u32, unit: f64, nodes: Vec<u32>, widens: Vec<(u32, DMat3)> },
     /// The mean angle about an axis through their middle is an unknown over a unit.
     Turn { nodes: Vec<u32>, axis: DVec3, angle: u32, unit: f64 },
     /// Nodes of one plane.
@@ -62,8 +63,8 @@ impl Curved {
     ) -> Option<Vec<Equation>> {
         let now = Now { places, moved };
         let mut all = match &self.curve {
-            Curve::Body { reference, turning, unit, nodes } => {
-                body(&now, *reference, *turning, *unit, nodes)
+            Curve::Body { reference, turning, unit, nodes, widens } => {
+                body(&now, [*reference, *turning], *unit, nodes, widens)
             }
             Curve::Turn { nodes, axis, angle, unit } => {
                 let (slopes, mean) = turn(&now, nodes, *axis)?;
@@ -81,24 +82,28 @@ impl Curved {
 
 fn body<F: Fn(u32) -> f64>(
     now: &Now<'_, F>,
-    reference: u32,
-    turning: u32,
+    [reference, turning]: [u32; 2],
     unit: f64,
     nodes: &[u32],
+    widens: &[(u32, DMat3)],
 ) -> Vec<Equation> {
     let angles = now.moved(turning) / unit;
     let mut all = Vec::with_capacity(3 * nodes.len());
     for &node in nodes {
         let arm = now.was(node) - now.was(reference);
-        let (turned, slopes) = rotated(angles, arm);
+        let wide: DVec3 = widens.iter().map(|&(u, way)| (now.moved)(u) * (way * arm)).sum();
+        let (turned, slopes) = rotated(angles, arm + wide);
+        let by_angle = (3 * turning..).zip(slopes).map(|(u, slope)| (u, slope / unit));
+        let by_width = widens.iter().map(|&(u, way)| (u, rotated(angles, way * arm).0));
+        let changes: Vec<(u32, DVec3)> = by_angle.chain(by_width).collect();
         for i in 0..3 {
             let mut terms = vec![(3 * node + i, 1.0), (3 * reference + i, -1.0)];
             let mut value = turned[i as usize] - arm[i as usize];
-            for (j, slope) in (0..3).zip(slopes) {
-                let slope = slope[i as usize];
-                value -= slope * angles[j as usize];
+            for &(unknown, change) in &changes {
+                let slope = change[i as usize];
+                value -= slope * (now.moved)(unknown);
                 if slope != 0.0 {
-                    terms.push((3 * turning + j, -slope / unit));
+                    terms.push((unknown, -slope));
                 }
             }
             all.push(Equation { terms, value, line: 0 });
@@ -257,7 +262,13 @@ mod tests {
         // The last node is the angles.
         moved[15..].copy_from_slice(&[0.0, 0.0, FRAC_PI_2]);
         for curve in [
-            Curve::Body { reference: 0, turning: 5, unit: 1.0, nodes: vec![1, 2, 3, 4] },
+            Curve::Body {
+                reference: 0,
+                turning: 5,
+                unit: 1.0,
+                nodes: vec![1, 2, 3, 4],
+                widens: vec![],
+            },
             Curve::Turn { nodes: vec![0, 1, 2, 3, 4], axis: DVec3::Z, angle: 17, unit: 1.0 },
         ] {
             residual(&curve, &moved)
@@ -271,7 +282,16 @@ mod tests {
     fn terms_are_differences() {
         let moved: Vec<f64> = (0..18).map(|i| 0.3 * (1.3 * f64::from(i)).sin()).collect();
         for curve in [
-            Curve::Body { reference: 0, turning: 5, unit: 2.0, nodes: vec![1, 2, 3, 4] },
+            Curve::Body {
+                reference: 0,
+                turning: 5,
+                unit: 2.0,
+                nodes: vec![1, 2, 3],
+                widens: vec![
+                    (12, DMat3::IDENTITY),
+                    (13, DMat3::from_cols(DVec3::Y, DVec3::X, DVec3::ZERO)),
+                ],
+            },
             Curve::Turn { nodes: vec![0, 1, 2, 3], axis: DVec3::Z, angle: 17, unit: 2.0 },
             Curve::Plane(vec![0, 1, 2, 3, 4]),
             Curve::Straight(vec![0, 1, 2]),

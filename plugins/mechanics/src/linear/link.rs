@@ -242,7 +242,8 @@ impl Reader {
         // Components of a node that turns are angles.
         let unit = if self.turning.contains_key(&reference) { 1.0 } else { self.units.length() };
         let nodes = nodes.into_iter().filter(|&n| n != reference && n != turning).collect();
-        self.bound(Curve::Body { reference, turning, unit, nodes }, card.line);
+        let widens = Vec::new();
+        self.bound(Curve::Body { reference, turning, unit, nodes, widens }, card.line);
         Ok(())
     }
 

@@ -10,7 +10,7 @@ use super::{
     plastic::Hardening,
     read::{Kind, Reader, Section, plain},
     shape::Shape,
-    thin::{Hollow, Profile, Thin},
+    thin::{Form, Profile, Thin},
 };
 use crate::{
     read::{
@@ -212,6 +212,7 @@ impl Reader {
             "SOLIDSECTION" => self.solid_section(card),
             "SHELLSECTION" => self.shell_section(card),
             "BEAMSECTION" | "BEAMGENERALSECTION" => self.beam_section(card),
+            "NORMAL" => self.normal(card),
             "NODALTHICKNESS" => {
                 // No section asks for it, and CalculiX leaves it out as well.
                 self.deck.notes.push(format!(
@@ -336,10 +337,11 @@ impl Reader {
 
     fn beam_section(&mut self, card: &Card<'_>) -> Result<(), Fault> {
         card.only(&["ELSET", "MATERIAL", "SECTION", "OFFSET1", "OFFSET2"])?;
-        for offset in ["OFFSET1", "OFFSET2"] {
-            if card.get(offset).is_some_and(|o| o.parse::<f64>() != Ok(0.0)) {
-                return Err(card.fault(format!("*{}: only {offset}=0 is supported", card.name)));
-            }
+        let mut offset = [0.0; 2];
+        for (offset, name) in offset.iter_mut().zip(["OFFSET1", "OFFSET2"]) {
+            let Some(word) = card.get(name) else { continue };
+            let found = word.parse().ok().filter(|o: &f64| o.is_finite());
+            *offset = found.ok_or_else(|| card.fault(format!("{name} is a number")))?;
         }
         let mut rows = card.rows();
         let sizes = rows.next().ok_or_else(|| card.fault("needed are: sizes of the section"))?;
@@ -352,21 +354,21 @@ impl Reader {
             Some(row) => DVec3::from_slice(&row.numbers("x, y, z of the 1-direction", 3..=3)?),
             None => DVec3::NEG_Z,
         };
-        let (size, hollow) = match (card.word("SECTION").as_deref(), sizes.as_slice()) {
-            (Some("RECT"), &[a, b]) => ([a, b], None),
-            (Some("RECT"), &[a]) => ([a, a], None),
+        let (size, form) = match (card.word("SECTION").as_deref(), sizes.as_slice()) {
+            (Some("RECT"), &[a, b]) => ([a, b], Form::Full),
+            (Some("RECT"), &[a]) => ([a, a], Form::Full),
+            (Some("CIRC"), &[a, b]) => ([a, b], Form::Round),
+            (Some("CIRC"), &[a]) => ([a, a], Form::Round),
             (Some("PIPE"), &[radius, wall]) if wall < radius => {
-                ([2.0 * radius; 2], Some(Hollow::Pipe(wall)))
+                ([2.0 * radius; 2], Form::Pipe(wall))
             }
-            (Some("BOX"), &[a, b, wall, ref more @ ..])
-                if more.iter().all(|m| (m - wall).abs() <= 1e-9 * wall)
-                    && 2.0 * wall < a.min(b) =>
-            {
-                ([a, b], Some(Hollow::Box(wall)))
+            (Some("BOX"), &[a, b, w]) if 2.0 * w < a.min(b) => ([a, b], Form::Box([w; 4])),
+            (Some("BOX"), &[a, b, t1, t2, t3, t4]) if t1 + t3 < a && t2 + t4 < b => {
+                ([a, b], Form::Box([t1, t2, t3, t4]))
             }
             _ => {
                 return Err(card.fault(
-                    "sections are RECT (two sizes), PIPE (outer radius, wall) and BOX (two sizes, walls of one thickness)",
+                    "sections are RECT and CIRC (two sizes), PIPE (outer radius, wall) and BOX (two sizes, one wall or four)",
                 ));
             }
         };
@@ -374,12 +376,14 @@ impl Reader {
             material: self.named_material(card, &card.need("MATERIAL")?)?,
             orientation: None,
             thickness: size[0],
-            profile: Profile::Beam { first, size, hollow },
+            profile: Profile::Beam { first, size, offset, form },
         };
         self.assign(card, &section, |kind| match kind {
-            Kind::Thin(Thin::Beam { shape, .. }) => {
-                hollow.is_none() || shape == Shape::Hex20Reduced
-            }
+            Kind::Thin(Thin::Beam { shape, .. }) => match form {
+                Form::Full => true,
+                Form::Round => shape != Shape::Hex8Bubbles,
+                Form::Pipe(_) | Form::Box(_) => shape == Shape::Hex20Reduced,
+            },
             _ => false,
         })
     }
@@ -554,7 +558,7 @@ fn engineering(card: &Card<'_>, n: &[f64; 9]) -> Result<[f64; 9], Fault> {
 }
 
 /// Two points.
-fn six(card: &Card<'_>) -> Result<[DVec3; 2], Fault> {
+pub(super) fn six(card: &Card<'_>) -> Result<[DVec3; 2], Fault> {
     let mut rows = card.rows();
     let what = "two points: x, y, z, x, y, z";
     let row: Row<'_> = rows.next().ok_or_else(|| card.fault(format!("needed are {what}")))?;

@@ -284,7 +284,7 @@ impl Reader {
             let Some(section) = &raw.section else { continue };
             let cell = match raw.kind {
                 Kind::Link(_) => continue,
-                Kind::Thin(thin) => self.thickened(raw, thin, section),
+                Kind::Thin(thin) => self.thickened(i as u32, thin, section),
                 Kind::Solid(shape) => whole(raw, shape, raw.nodes.clone(), section),
                 Kind::Flat(flat) => {
                     let deck = &mut self.deck;

@@ -23,6 +23,8 @@ const NOTHING: f64 = 1e-9;
 const ENOUGH: usize = 600;
 /// Stiffness by mass that is added where parts can move freely, over the ratio of both traces.
 const SHIFT: f64 = 1e-9;
+/// By how much an eigenvalue of nothing may be below it, over that.
+const ROUNDING: f64 = 1e-3;
 
 /// Why there are no eigenvalues.
 #[derive(Debug)]
@@ -56,15 +58,22 @@ pub(super) fn smallest(
 ) -> Result<Vec<Mode>, Failed> {
     match Krylov::new(&k, g, job) {
         Ok(krylov) => krylov.smallest(count, job),
-        Err(Failed::Solve(
-            SolveError::Indefinite { .. }
-            | SolveError::NoStiffness { .. }
-            | SolveError::NotConverged { .. },
-        )) if g.trace() > 0.0 => {
+        Err(
+            Failed::Indefinite
+            | Failed::Solve(
+                SolveError::Indefinite { .. }
+                | SolveError::Floating { .. }
+                | SolveError::NoStiffness { .. }
+                | SolveError::NotConverged { .. },
+            ),
+        ) if g.trace() > 0.0 => {
             let shift = SHIFT * k.trace() / g.trace();
             k.add(shift, g);
-            let found = Krylov::new(&k, g, job)?.smallest(count, job)?;
-            Ok(found.into_iter().map(|m| Mode { value: m.value - shift, ..m }).collect())
+            let mut found = Krylov::new(&k, g, job)?.smallest(count, job)?;
+            found.iter_mut().for_each(|mode| mode.value -= shift);
+            // What moves freely differs from nothing by rounding alone.
+            let is_unstable = found.iter().any(|mode| mode.value < -ROUNDING * shift);
+            if is_unstable { Err(Failed::Indefinite) } else { Ok(found) }
         }
         Err(other) => Err(other),
     }

@@ -5,7 +5,10 @@ use std::{
     path::Path,
 };
 
+use glam::DVec3;
+
 use super::{
+    cyclic::Sides,
     flat::Flat,
     link::Link,
     model::Deck,
@@ -26,7 +29,8 @@ use crate::read::{
 const KNOWN: &str = "NODE ELEMENT NSET ELSET SURFACE MATERIAL ELASTIC DENSITY EXPANSION \
     CONDUCTIVITY SPECIFICHEAT DAMPING PLASTIC CYCLICHARDENING HYPERELASTIC HYPERFOAM \
     DEFORMATIONPLASTICITY SOLIDSECTION SHELLSECTION BEAMSECTION \
-    BEAMGENERALSECTION NODALTHICKNESS MEMBRANE ORIENTATION AMPLITUDE TRANSFORM EQUATION TIE \
+    BEAMGENERALSECTION NODALTHICKNESS NORMAL MEMBRANE ORIENTATION AMPLITUDE TRANSFORM EQUATION TIE \
+    CYCLICSYMMETRYMODEL SELECTCYCLICSYMMETRYMODES \
     SPRING DASHPOT MPC RIGIDBODY DISTRIBUTINGCOUPLING PRE-TENSIONSECTION PHYSICALCONSTANTS \
     INITIALCONDITIONS BOUNDARY STEP STATIC DYNAMIC FREQUENCY BUCKLE HEATTRANSFER MODALDYNAMIC \
     STEADYSTATEDYNAMICS MODALDAMPING CLOAD DLOAD DSLOAD \
@@ -98,12 +102,14 @@ fn deck(bytes: &[u8], units: Units) -> Result<Deck, Fault> {
     let ended = state.ended();
     reader.keep(ended);
     // Ties last: what is bound otherwise stays as it is.
-    for pass in [Reader::equation, Reader::tie] {
+    for pass in [Reader::equation, Reader::tie, Reader::cyclic] {
         cards.iter().for_each(|card| {
             let read = pass(&mut reader, card);
             reader.keep(read);
         });
     }
+    let sectored = reader.sectored();
+    reader.keep(sectored);
     reader.fail()?;
     Ok(reader.finished())
 }
@@ -184,9 +190,13 @@ pub(super) struct Reader {
     pub(super) turning: HashMap<u32, u32>,
     /// What nodes of beams and shells become.
     pub(super) rings: Rings,
+    /// Normals of these that are given, by element and node.
+    pub(super) normals: HashMap<(u32, u32), DVec3>,
     /// W/(m²·K⁴).
     pub(super) boltzmann: Option<f64>,
     pub(super) tied: bool,
+    /// Ties between sides of sectors.
+    pub(super) sides: Vec<Sides>,
     /// Places of equations by the component that comes first in them.
     pub(super) equations: BTreeMap<(u32, u8), usize>,
     /// Steps that end equations, all of them or those that a component comes first in.
@@ -211,9 +221,11 @@ impl Reader {
             amplitudes: HashMap::new(),
             sprung: BTreeSet::new(),
             turning: HashMap::new(),
-            rings: HashMap::new(),
+            rings: Rings::default(),
+            normals: HashMap::new(),
             boltzmann: None,
             tied: false,
+            sides: Vec::new(),
             equations: BTreeMap::new(),
             ended: Vec::new(),
             in_material: false,
@@ -254,6 +266,7 @@ impl Reader {
 
     /// Names all that is not computed, each once.
     fn admit(&mut self, cards: &[Card<'_>]) {
+        self.tied = cards.iter().any(|c| c.is("TIE"));
         let has_contact = cards.iter().any(|c| c.is("CONTACT PAIR") || c.is("CLEARANCE"));
         let mut seen = BTreeSet::new();
         for card in cards {

@@ -183,6 +183,16 @@ impl Deck {
                 Procedure::Motion { .. } | Procedure::Harmonic { .. } => {
                     solved.extend(vibrate::solve(self, step, &mut past, &part)?);
                 }
+                Procedure::Modes { count, stressed, .. } if step.diameters.is_some() => {
+                    past.modes = None;
+                    let [least, most] = step.diameters.unwrap_or_default();
+                    for number in least..=most {
+                        let (system, all) =
+                            self.vibrating(step, count, stressed, Some(number), &past, &part)?;
+                        let name = format!("{}, {number} nodal diameters", step.name);
+                        solved.push(Solved { name, ..system.eigenvalues(&all) });
+                    }
+                }
                 _ => solved.push(self.step(step, &mut past, &part)?),
             }
         }
@@ -193,17 +203,7 @@ impl Deck {
         match step.procedure {
             Procedure::Modes { count, heat: true, .. } => heat::modes(self, step, count, job),
             Procedure::Modes { count, stressed, .. } => {
-                let (system, stiffness) = match stressed {
-                    true if past.large => large::tangent(self, step, past, job)?,
-                    _ => {
-                        let system = System::new(self, step, past)?;
-                        let stresses = if stressed { past.stresses.as_slice() } else { &[] };
-                        let stiffness = system.stiff_under(stresses, job)?;
-                        (system, stiffness)
-                    }
-                };
-                let (mass, _) = system.mass(job)?;
-                let all = system.smallest(stiffness, &mass, count, job)?;
+                let (system, all) = self.vibrating(step, count, stressed, None, past, job)?;
                 let solved = system.eigenvalues(&all);
                 let order = system.free.order().to_vec();
                 past.modes = Some(vibrate::Modes { order, all, state: Vec::new() });
@@ -221,6 +221,31 @@ impl Deck {
             _ if step.large => large::solve(self, step, past, job),
             _ => System::new(self, step, past)?.solve(past, job),
         }
+    }
+
+    /// The first modes of motion, with the stresses of the step before or without; those of so many
+    /// nodal diameters.
+    fn vibrating<'a>(
+        &'a self,
+        step: &'a Step,
+        count: usize,
+        stressed: bool,
+        diameters: Option<u32>,
+        past: &Past,
+        job: &Job,
+    ) -> Result<(System<'a>, Vec<Mode>), LinearError> {
+        let (system, stiffness) = if stressed && past.large {
+            large::tangent(self, step, past, diameters, job)?
+        } else {
+            let equations = self.constraints(step, past);
+            let system = System::bound(self, step, past, &equations, diameters, false)?;
+            let stresses = if stressed { past.stresses.as_slice() } else { &[] };
+            let stiffness = system.stiff_under(stresses, job)?;
+            (system, stiffness)
+        };
+        let (mass, _) = system.mass(job)?;
+        let all = system.smallest(stiffness, &mass, count, job)?;
+        Ok((system, all))
     }
 
     /// What is held in a step, then what binds the rest.
@@ -265,7 +290,28 @@ impl<'a> System<'a> {
         Ok(Self::of(deck, step, past, sums, false))
     }
 
-    /// From what every unknown is by the free ones, with springs that turn or not.
+    /// From what binds it; with so many nodal diameters, real and imaginary parts of a sector.
+    pub(super) fn bound(
+        deck: &'a Deck,
+        step: &'a Step,
+        past: &Past,
+        equations: &[Equation],
+        diameters: Option<u32>,
+        large: bool,
+    ) -> Result<Self, LinearError> {
+        let sums = match diameters {
+            None => sums(deck, step, equations)?,
+            Some(number) => {
+                let supports = step.held.len() + step.kept.len();
+                let all = deck.waved(equations, supports, number);
+                sums_of(6 * deck.nodes.len() as u32, step, &all)?
+            }
+        };
+        Ok(Self::of(deck, step, past, sums, large))
+    }
+
+    /// From what every unknown is by the free ones, with springs that turn or not. Where there are
+    /// several copies of the deck, their unknowns follow each other.
     pub(super) fn of(
         deck: &'a Deck,
         step: &'a Step,
@@ -274,8 +320,10 @@ impl<'a> System<'a> {
         large: bool,
     ) -> Self {
         let warm = if step.warm.is_empty() { &past.temperatures } else { &step.warm };
-        let elements = (0..deck.cells.len() + deck.springs.len()).map(|e| unknowns(deck, e, large));
-        let free = Free::new(deck, sums, elements, |unknown| unknown / 3);
+        let (each, own) = (deck.cells.len() + deck.springs.len(), 3 * deck.nodes.len());
+        let copies = sums.len() / own.max(1);
+        let elements = (0..copies * each).map(|e| copied(deck, e, large));
+        let free = Free::new(deck, sums, elements, |unknown| unknown % own as u32 / 3);
         Self { deck, step, warm: warm.clone(), free, large }
     }
 
@@ -363,7 +411,12 @@ impl<'a> System<'a> {
         job: &Job,
         fill: impl Fn(usize, &mut [f64], &mut [f64]) -> Result<(), Folded> + Sync,
     ) -> Result<(BlockMatrix<1>, Vec<f64>), LinearError> {
-        self.free.assembled(job, |e| unknowns(self.deck, e, self.large), fill)
+        let each = self.deck.cells.len() + self.deck.springs.len();
+        self.free.assembled(
+            job,
+            |e| copied(self.deck, e, self.large),
+            |e, k, f| fill(e % each, k, f),
+        )
     }
 
     fn solve(self, past: &mut Past, job: &Job) -> Result<Solved, LinearError> {
@@ -419,6 +472,7 @@ impl<'a> System<'a> {
     fn explained(&self, error: SolveError) -> LinearError {
         match error {
             SolveError::Indefinite { .. }
+            | SolveError::Floating { .. }
             | SolveError::NoStiffness { .. }
             | SolveError::NotConverged { .. } => self.floating(),
             other => other.into(),
@@ -557,10 +611,22 @@ pub(super) fn sums(
     step: &Step,
     equations: &[Equation],
 ) -> Result<Vec<Sum>, LinearError> {
+    sums_of(3 * deck.nodes.len() as u32, step, equations)
+}
+
+/// So many unknowns by what is free.
+fn sums_of(count: u32, step: &Step, equations: &[Equation]) -> Result<Vec<Sum>, LinearError> {
     // Supports first: equations then bind what is left.
     let bound = Bound::new(equations)
         .map_err(|e| LinearError::Contradiction { step: step.name.clone(), line: e.line })?;
-    Ok((0..3 * deck.nodes.len() as u32).map(|u| bound.of(u)).collect())
+    Ok((0..count).map(|u| bound.of(u)).collect())
+}
+
+/// Unknowns of an element or a spring of one of several copies of the deck.
+fn copied(deck: &Deck, e: usize, large: bool) -> Vec<u32> {
+    let each = deck.cells.len() + deck.springs.len();
+    let shift = (e / each * 3 * deck.nodes.len()) as u32;
+    unknowns(deck, e % each, large).into_iter().map(|u| u + shift).collect()
 }
 
 /// Unknowns of an element or, after the elements, of a spring, which may turn.

@@ -63,6 +63,7 @@ struct Open {
     perturbs: bool,
     procedure: Option<Procedure>,
     damping: Damping,
+    diameters: Option<[u32; 2]>,
 }
 
 impl State {
@@ -119,7 +120,7 @@ impl Reader {
     pub(super) fn history(&mut self, card: &Card<'_>, state: &mut State) -> Result<(), Fault> {
         let name = plain(card);
         const WITHIN: &str = "STATIC DYNAMIC FREQUENCY BUCKLE HEATTRANSFER MODALDYNAMIC \
-            STEADYSTATEDYNAMICS MODALDAMPING ENDSTEP CLOAD DLOAD DSLOAD TEMPERATURE CFLUX DFLUX \
+            STEADYSTATEDYNAMICS MODALDAMPING SELECTCYCLICSYMMETRYMODES ENDSTEP CLOAD DLOAD DSLOAD TEMPERATURE CFLUX DFLUX \
             FILM RADIATE CHANGESOLIDSECTION";
         if WITHIN.split_ascii_whitespace().any(|w| w == name) && state.open.is_none() {
             return Err(card.fault(format!("*{} must stand in a *STEP", card.name)));
@@ -134,6 +135,7 @@ impl Reader {
             | "MODALDYNAMIC"
             | "STEADYSTATEDYNAMICS" => procedure(card, &name, state),
             "MODALDAMPING" => damping(card, state),
+            "SELECTCYCLICSYMMETRYMODES" => diameters(card, state),
             "ENDSTEP" => self.close(state),
             "EQUATION" => self.end_equations(card, state),
             "BOUNDARY" => self.boundary(card, state),
@@ -151,7 +153,7 @@ impl Reader {
     /// What is in force at the end of the step.
     fn close(&mut self, state: &mut State) -> Result<(), Fault> {
         let Some(open) = state.open.take() else { return Ok(()) };
-        let Open { line, duration, damping, .. } = open;
+        let Open { line, duration, damping, diameters, .. } = open;
         let procedure = open.procedure.unwrap_or_default();
         self.suits(procedure, state, line)?;
         let in_time = matches!(procedure, Procedure::Heat { steady: false, .. });
@@ -175,6 +177,11 @@ impl Reader {
             state.loads(factor)?
         };
         (step.procedure, step.damping) = (procedure, damping);
+        step.diameters = diameters;
+        if diameters.is_some() && !matches!(procedure, Procedure::Modes { heat: false, .. }) {
+            let why = "*SELECT CYCLIC SYMMETRY MODES stands in a step of *FREQUENCY";
+            return Err(Fault::at(line, why));
+        }
         let may_be_large = matches!(procedure, Procedure::Static | Procedure::Dynamic { .. });
         step.large = state.large && may_be_large;
         if let Procedure::Heat { .. } | Procedure::Modes { heat: true, .. } = procedure {
@@ -382,8 +389,14 @@ impl Reader {
     /// A step of motion or vibration follows one of frequencies, and nothing warms in it.
     fn vibrates(&self, state: &State, line: u32) -> Result<(), Fault> {
         let is_modes = |s: &Step| matches!(s.procedure, Procedure::Modes { heat: false, .. });
-        if !self.deck.steps.iter().any(is_modes) {
-            return Err(Fault::at(line, "needed is a step of *FREQUENCY before this one"));
+        match self.deck.steps.iter().rev().find(|s| is_modes(s)) {
+            None => {
+                return Err(Fault::at(line, "needed is a step of *FREQUENCY before this one"));
+            }
+            Some(step) if step.diameters.is_some() => {
+                return Err(Fault::at(line, "motion by modes of sectors is not computed"));
+            }
+            Some(_) => {}
         }
         if !state.warm.is_empty() {
             return Err(Fault::at(line, "a *TEMPERATURE in motion by modes is not computed"));
@@ -759,8 +772,10 @@ impl Reader {
         if plain(card) != "TIE" {
             return Ok(());
         }
+        if card.get("CYCLIC SYMMETRY").is_some() {
+            return self.sided(card);
+        }
         card.only(&["NAME", "POSITION TOLERANCE", "ADJUST"])?;
-        self.tied = true;
         let row = card.one_row()?.ok_or_else(|| card.fault("needed are: slave, master"))?;
         let [slave, master] = row.exactly("slave, master")?;
         let find = |name: &str| {
@@ -839,6 +854,7 @@ fn begin(card: &Card<'_>, state: &mut State) -> Result<(), Fault> {
         perturbs: card.get("PERTURBATION").is_some(),
         procedure: None,
         damping: Damping::None,
+        diameters: None,
     });
     if let Some(word) = card.word("NLGEOM") {
         state.large = word != "NO";
@@ -975,6 +991,19 @@ fn damping(card: &Card<'_>, state: &mut State) -> Result<(), Fault> {
         shares.iter_mut().take(last).skip(first - 1).for_each(|s| *s = share);
     }
     open.damping = Damping::Shares(shares);
+    Ok(())
+}
+
+/// `*SELECT CYCLIC SYMMETRY MODES`
+fn diameters(card: &Card<'_>, state: &mut State) -> Result<(), Fault> {
+    card.only(&["NMIN", "NMAX"])?;
+    let number = |name: &str| card.get(name).and_then(|word| word.parse::<u32>().ok());
+    let (least, most) = (number("NMIN").unwrap_or(0), number("NMAX"));
+    let most = most.filter(|m| (least..=10_000).contains(m));
+    let most = most.ok_or_else(|| card.fault("needed are NMIN and NMAX, numbers that ascend"))?;
+    if let Some(open) = &mut state.open {
+        open.diameters = Some([least, most]);
+    }
     Ok(())
 }
 

@@ -2,24 +2,30 @@
 //! one-dimensional and two-dimensional elements"). Every node of the deck becomes a ring of nodes:
 //! two or three along the normal of a shell, four or eight around the section of a beam. It moves
 //! as the mean of the outer ones, and turns as their mean rotation; where its angles are supported,
-//! nodes between outer ones stay between them. Sections that are no rectangle are one by where
+//! nodes between outer ones stay between them. Where elements meet at an angle or with other
+//! sections, their rings there are one stiff knot. Sections that are no rectangle are one by where
 //! they are integrated.
 
 use std::{
     collections::{BTreeMap, HashMap},
-    f64::consts::{FRAC_PI_4, PI},
+    f64::consts::{FRAC_1_SQRT_2, FRAC_PI_4, PI},
+    mem::discriminant,
 };
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
+use nalgebra::{Matrix3, Vector3};
 
 use super::{
     constraint::Equation,
-    curve::Curve,
+    curve::{Curve, terms},
     model::{Cell, Deck},
-    read::{Kind, Raw, Reader, Section},
+    read::{Kind, Reader, Section},
     shape::{GAUSS_2, Point, Shape, face_functions, face_places},
 };
-use crate::read::{Fault, abaqus::card::Row};
+use crate::read::{
+    Fault,
+    abaqus::card::{Card, Row},
+};
 
 /// An element of a line or of a surface.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -39,22 +45,27 @@ pub(super) enum Profile {
     /// How far the middle lies off the nodes along the normal, over the thickness; thickness,
     /// material and axes of every layer from below, where it has some.
     Shell { offset: f64, layers: Vec<(f64, u32, Option<u32>)> },
-    /// Its 1-direction, and its sizes along both.
-    Beam { first: DVec3, size: [f64; 2], hollow: Option<Hollow> },
+    /// Its 1-direction; its sizes along both, and how far the nodes lie off its middle over these.
+    Beam { first: DVec3, size: [f64; 2], offset: [f64; 2], form: Form },
 }
 
-/// A hollow section.
+/// What is within the sizes of a section.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Hollow {
+pub(super) enum Form {
+    /// All of them.
+    Full,
+    /// An ellipse.
+    Round,
     /// A tube of this thickness, m.
     Pipe(f64),
-    /// Walls of this thickness, m.
-    Box(f64),
+    /// Walls of these thicknesses, m: beyond the 1-direction, beyond the 2-direction, and the two
+    /// opposite to them.
+    Box([f64; 4]),
 }
 
 /// Nodes that a node of a beam or a shell becomes.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Ring {
+struct Ring {
     /// Those whose mean the node is.
     outer: Vec<u32>,
     /// Others, and the two that each lies between.
@@ -63,18 +74,43 @@ pub(super) struct Ring {
     stiff: bool,
 }
 
+/// Rings of all nodes of beams and shells.
+#[derive(Debug, Default)]
+pub(super) struct Rings {
+    all: Vec<Ring>,
+    /// By element and place of the node in it.
+    of: HashMap<(u32, usize), usize>,
+    /// By node, where it has one alone.
+    alone: HashMap<u32, usize>,
+}
+
 /// Axes of a node: normal of a shell; tangent and 1-direction of a beam; and sizes.
 #[derive(Debug, Clone, Copy)]
 struct Axes {
-    of_beam: bool,
+    /// None: of a shell.
+    form: Option<Form>,
     first: DVec3,
     second: DVec3,
     sizes: [f64; 2],
-    quadratic: bool,
+    offset: [f64; 2],
+    /// Whether the normal is that of a `*NORMAL`.
+    given: bool,
+    /// Whether there are nodes between the outer ones.
+    ends: bool,
 }
 
-/// Angles up to which axes of neighbours are one, degrees: of beams and of shells.
-const ALIKE: [f64; 2] = [0.5, 20.0];
+/// A node of an element, by its place there, and its axes.
+#[derive(Debug, Clone, Copy)]
+struct Corner {
+    element: u32,
+    place: usize,
+    axes: Axes,
+}
+
+/// Angles up to which axes of neighbours are one, degrees: computed ones, and those that are given.
+const ALIKE: [f64; 2] = [20.0, 0.5];
+/// Spread of the nodes of a knot along an axis that counts as none, over the largest.
+const NO_SPREAD: f64 = 1e-9;
 
 impl Thin {
     pub(super) fn of(name: &str) -> Option<Self> {
@@ -105,6 +141,15 @@ impl Thin {
         }
     }
 
+    /// Whether there are nodes between the outer ones around this of its nodes.
+    fn ends(self, place: usize) -> bool {
+        let is_end = match self {
+            Self::Beam { .. } => place != 1,
+            Self::Shell { corners, .. } => place < corners,
+        };
+        is_end && self.shape().nodes() > 8
+    }
+
     /// Axes at each of its nodes.
     fn axes(self, places: &[DVec3], section: &Section) -> Option<Vec<Axes>> {
         match (self, &section.profile) {
@@ -115,24 +160,28 @@ impl Thin {
                         jets.iter().zip(places).map(|(j, &p)| j.slope[i] * p).sum()
                     };
                     Some(Axes {
-                        of_beam: false,
+                        form: None,
                         first: along(0).cross(along(1)).try_normalize()?,
                         second: DVec3::ZERO,
-                        sizes: [section.thickness, *offset],
-                        quadratic: self.shape().nodes() > 8,
+                        sizes: [section.thickness, 0.0],
+                        offset: [*offset, 0.0],
+                        given: false,
+                        ends: false,
                     })
                 };
                 face_places(places.len()).iter().map(normal).collect()
             }
-            (Self::Beam { .. }, Profile::Beam { first, size, .. }) => {
+            (Self::Beam { .. }, &Profile::Beam { first, size, offset, form }) => {
                 let axes = |tangent: DVec3| {
                     let tangent = tangent.try_normalize()?;
                     Some(Axes {
-                        of_beam: true,
+                        form: Some(form),
                         first: first.reject_from_normalized(tangent).try_normalize()?,
                         second: tangent,
-                        sizes: *size,
-                        quadratic: self.shape().nodes() > 8,
+                        sizes: size,
+                        offset,
+                        given: false,
+                        ends: false,
                     })
                 };
                 let tangents = match *places {
@@ -186,25 +235,86 @@ fn four(ring: &Ring) -> [u32; 4] {
 impl Axes {
     /// Whether both are of one smooth line or surface, of one section.
     fn meets(&self, other: &Self) -> bool {
-        // Sums of several axes stand for their mean.
-        let near = |a: DVec3, b: DVec3| {
-            a.dot(b)
-                >= a.length() * b.length() * ALIKE[usize::from(!self.of_beam)].to_radians().cos()
-        };
-        let alike = self.of_beam == other.of_beam && self.quadratic == other.quadratic;
-        let along = !self.of_beam || near(self.second, other.second);
-        alike && self.sizes == other.sizes && near(self.first, other.first) && along
+        let near =
+            |a: DVec3, b: DVec3| a.dot(b) >= ALIKE[usize::from(self.given)].to_radians().cos();
+        let kind = |axes: &Self| axes.form.as_ref().map(discriminant);
+        kind(self) == kind(other)
+            && self.sizes == other.sizes
+            && self.offset == other.offset
+            && near(self.first, other.first)
+            && (self.form.is_none() || near(self.second, other.second))
+    }
+
+    /// The mean of such axes, whose first are those that others were compared with.
+    fn mean(self, others: &[Corner]) -> Self {
+        others.iter().map(|corner| corner.axes).fold(self, |sum, other| Self {
+            first: if sum.given { sum.first } else { sum.first + other.first },
+            second: sum.second + other.second,
+            ends: sum.ends || other.ends,
+            ..sum
+        })
     }
 }
 
 impl Reader {
-    /// Rings of all nodes of beams and shells.
+    /// `*NORMAL`: element, node, and the normal of the shell or the 2-direction of the beam there.
+    pub(super) fn normal(&mut self, card: &Card<'_>) -> Result<(), Fault> {
+        card.only(&[])?;
+        for row in card.rows() {
+            let [element, node, along @ ..] = row.exactly::<5>("element, node, x, y, z")?;
+            let mut normal = DVec3::ZERO;
+            for (i, word) in along.iter().enumerate() {
+                normal[i] = row.number(word)?;
+            }
+            let normal =
+                normal.try_normalize().ok_or_else(|| row.fault("a normal has a length"))?;
+            let node = self.node(node, row)?;
+            for element in self.some_elements(element, row)? {
+                self.normals.insert((element, node), normal);
+            }
+        }
+        Ok(())
+    }
+
+    /// Rings of all nodes of beams and shells: one where these go on smoothly with one section,
+    /// several that are bound to each other where they do not.
     ///
     /// # Errors
-    /// Where lines or surfaces meet at an angle or with other sections.
+    /// What has no axes.
     pub(super) fn ring(&mut self) -> Result<(), Fault> {
-        let mut found: BTreeMap<u32, (Axes, bool)> = BTreeMap::new();
-        for raw in &self.raw {
+        for (node, mut corners) in self.corners()? {
+            // As CalculiX goes: normals that are given first, then by the number of the element.
+            corners.sort_by_key(|c| (!c.axes.given, self.raw[c.element as usize].label));
+            let before = self.rings.all.len();
+            let of_beams = corners.iter().any(|c| c.axes.form.is_some());
+            let (mut means, each) = (Vec::new(), 1.0 / corners.len() as f64);
+            while let Some(first) = corners.first().map(|c| c.axes) {
+                let (own, others): (Vec<Corner>, Vec<Corner>) =
+                    corners.into_iter().partition(|c| first.meets(&c.axes));
+                let ring = make_ring(&mut self.deck, node, &first.mean(&own[1..]));
+                let weight = each * own.len() as f64;
+                means.extend(ring.mean().into_iter().map(|(n, share)| (n, weight * share)));
+                let number = self.rings.all.len();
+                self.rings.of.extend(own.iter().map(|c| ((c.element, c.place), number)));
+                self.rings.all.push(ring);
+                corners = others;
+            }
+            if self.rings.all.len() == before + 1 {
+                hang(&mut self.deck, node, &self.rings.all[before]);
+                self.rings.alone.insert(node, before);
+            } else {
+                // What CalculiX prints of a node is the mean over its elements.
+                self.deck.means.insert(node, means);
+                self.knot(node, before, of_beams);
+            }
+        }
+        Ok(())
+    }
+
+    /// Nodes of beams and shells as their elements have them.
+    fn corners(&self) -> Result<BTreeMap<u32, Vec<Corner>>, Fault> {
+        let mut all: BTreeMap<u32, Vec<Corner>> = BTreeMap::new();
+        for (element, raw) in (0..).zip(&self.raw) {
             let (Kind::Thin(thin), Some(section)) = (raw.kind, &raw.section) else { continue };
             let places: Vec<DVec3> =
                 raw.nodes.iter().map(|&n| self.deck.nodes[n as usize]).collect();
@@ -212,32 +322,46 @@ impl Reader {
             let axes = thin.axes(&places, section);
             let axes =
                 axes.ok_or_else(|| Fault::at(raw.line, format!("element {} {why}", raw.label)))?;
-            for (i, (&node, own)) in raw.nodes.iter().zip(axes).enumerate() {
-                let is_end =
-                    if own.of_beam { i != 1 || places.len() == 2 } else { 2 * i < places.len() };
-                let ends = own.quadratic && is_end;
-                let Some(known) = found.get_mut(&node) else {
-                    found.insert(node, (own, ends));
-                    continue;
-                };
-                if !known.0.meets(&own) || known.1 != ends {
-                    return Err(Fault::at(
-                        raw.line,
-                        format!(
-                            "at node {} beams or shells meet at an angle or with other sections, which is not computed",
-                            self.deck.labels[node as usize]
-                        ),
-                    ));
+            for (place, (&node, mut axes)) in raw.nodes.iter().zip(axes).enumerate() {
+                axes.ends = thin.ends(place);
+                if let Some(&normal) = self.normals.get(&(element, node)) {
+                    axes.given = true;
+                    let across = normal.cross(axes.second).try_normalize().unwrap_or(axes.first);
+                    axes.first = if axes.form.is_some() { across } else { normal };
                 }
-                known.0.first += own.first;
-                known.0.second += own.second;
+                all.entry(node).or_default().push(Corner { element, place, axes });
             }
         }
-        for (node, (axes, ends)) in found {
-            let ring = make_ring(&mut self.deck, node, &axes, ends);
-            self.rings.insert(node, ring);
+        Ok(all)
+    }
+
+    /// Binds the rings from a number on to their node: they turn with it as one, and widen alike
+    /// along all axes; where all lie in a plane and some are of beams, as they like in that plane
+    /// (user's manual of CalculiX, "Arbitrary knot").
+    fn knot(&mut self, node: u32, first: usize, of_beams: bool) {
+        let around = |ring: &Ring| {
+            let between: Vec<u32> = ring.between.iter().map(|b| b.0).collect();
+            [ring.outer.as_slice(), &between].concat()
+        };
+        let nodes: Vec<u32> = self.rings.all[first..].iter().flat_map(around).collect();
+        let places: Vec<DVec3> = nodes.iter().map(|&n| self.deck.nodes[n as usize]).collect();
+        let (turning, stretch) = (self.hidden_node(node), self.hidden_node(node));
+        let (axes, extent) = spread(&places);
+        let widens = match extent {
+            2 if of_beams => {
+                let [a, b] = [axes[0], axes[1]];
+                vec![dyad(a, a), dyad(b, b), dyad(a, b) + dyad(b, a)]
+            }
+            _ => vec![DMat3::IDENTITY],
+        };
+        let widens = (3 * stretch..).zip(widens).collect();
+        self.turning.insert(node, turning);
+        self.bound(Curve::Body { reference: node, turning, unit: 1.0, nodes, widens }, 0);
+        if extent == 1 {
+            // What lies on a line says nothing of turning about it.
+            let terms = terms(&[(turning, axes[0])]);
+            self.deck.equations.push(Equation { terms, value: 0.0, line: 0 });
         }
-        Ok(())
     }
 
     /// The hidden node whose components are the angles of a node of a beam or a shell.
@@ -247,7 +371,8 @@ impl Reader {
         supported: Option<u32>,
         row: Row<'_>,
     ) -> Option<u32> {
-        let ring = self.rings.get(&node)?.clone();
+        let number = *self.rings.alone.get(&node)?;
+        let ring = self.rings.all[number].clone();
         if let (Some(step), false) = (supported, ring.stiff) {
             for (middle, [a, b]) in &ring.between {
                 for i in 0..3 {
@@ -255,7 +380,7 @@ impl Reader {
                     self.deck.later.push((step, Equation { terms, value: 0.0, line: row.line }));
                 }
             }
-            self.rings.entry(node).and_modify(|r| r.stiff = true);
+            self.rings.all[number].stiff = true;
         }
         if let Some(&turning) = self.turning.get(&node) {
             return Some(turning);
@@ -271,8 +396,10 @@ impl Reader {
     }
 
     /// The solid that a beam or a shell becomes.
-    pub(super) fn thickened(&self, raw: &Raw, thin: Thin, section: &Section) -> Cell {
-        let rings: Vec<&Ring> = raw.nodes.iter().filter_map(|n| self.rings.get(n)).collect();
+    pub(super) fn thickened(&self, element: u32, thin: Thin, section: &Section) -> Cell {
+        let raw = &self.raw[element as usize];
+        let ring = |place| self.rings.of.get(&(element, place)).map(|&n| &self.rings.all[n]);
+        let rings: Vec<&Ring> = (0..raw.nodes.len()).filter_map(ring).collect();
         let (points, materials) = integration(thin, section);
         Cell {
             label: raw.label,
@@ -286,8 +413,8 @@ impl Reader {
     }
 }
 
-/// The nodes around a node, and what makes it their mean.
-fn make_ring(deck: &mut Deck, node: u32, axes: &Axes, ends: bool) -> Ring {
+/// The nodes around a node.
+fn make_ring(deck: &mut Deck, node: u32, axes: &Axes) -> Ring {
     let middle = deck.nodes[node as usize];
     let mut add = |place: DVec3| {
         let number = deck.nodes.len() as u32;
@@ -296,44 +423,81 @@ fn make_ring(deck: &mut Deck, node: u32, axes: &Axes, ends: bool) -> Ring {
         number
     };
     let mut ring = Ring::default();
-    if axes.of_beam {
-        let tangent = axes.second.normalize_or_zero();
-        let first = axes.first.reject_from_normalized(tangent).normalize_or_zero();
-        let second = tangent.cross(first);
-        let at = |[a, b]: [f64; 2]| {
-            middle + 0.5 * (a * axes.sizes[0] * first + b * axes.sizes[1] * second)
-        };
-        let corners = [[-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0], [1.0, 1.0]];
-        ring.outer = corners.map(|c| add(at(c))).to_vec();
-        if ends {
-            let edges = [[-1.0, 0.0], [0.0, -1.0], [1.0, 0.0], [0.0, 1.0]];
-            for (i, edge) in edges.into_iter().enumerate() {
-                ring.between.push((add(at(edge)), [ring.outer[i], ring.outer[(i + 1) % 4]]));
-            }
-        }
-    } else {
+    let (sizes, offset) = (axes.sizes, axes.offset);
+    let Some(form) = axes.form else {
         let normal = axes.first.normalize_or_zero();
-        let [thickness, offset] = axes.sizes;
-        let at = |side: f64| middle + thickness * (offset + side) * normal;
+        let at = |side: f64| middle + sizes[0] * (offset[0] + side) * normal;
         ring.outer = [-0.5, 0.5].map(|s| add(at(s))).to_vec();
-        if ends {
+        if axes.ends {
             ring.between.push((add(at(0.0)), [ring.outer[0], ring.outer[1]]));
         }
+        return ring;
+    };
+    let tangent = axes.second.normalize_or_zero();
+    let first = axes.first.reject_from_normalized(tangent).normalize_or_zero();
+    let second = tangent.cross(first);
+    let at = |[a, b]: [f64; 2]| {
+        middle + (a - offset[0]) * sizes[0] * first + (b - offset[1]) * sizes[1] * second
+    };
+    // Corners of an ellipse lie on it.
+    let half = if form == Form::Round { 0.5 * FRAC_1_SQRT_2 } else { 0.5 };
+    let corners = [[-half, half], [-half, -half], [half, -half], [half, half]];
+    ring.outer = corners.map(|c| add(at(c))).to_vec();
+    if axes.ends {
+        let edges = [[-0.5, 0.0], [0.0, -0.5], [0.5, 0.0], [0.0, 0.5]];
+        for (i, edge) in edges.into_iter().enumerate() {
+            ring.between.push((add(at(edge)), [ring.outer[i], ring.outer[(i + 1) % 4]]));
+        }
     }
+    ring
+}
+
+/// Makes a node the mean of those around it.
+fn hang(deck: &mut Deck, node: u32, ring: &Ring) {
     let share = -1.0 / ring.outer.len() as f64;
     for i in 0..3 {
         let mut terms = vec![(3 * node + i, 1.0)];
         terms.extend(ring.outer.iter().map(|n| (3 * n + i, share)));
         deck.equations.push(Equation { terms, value: 0.0, line: 0 });
     }
-    // What CalculiX prints of a corner of a quadratic shell is the mean over its thickness.
-    if let (false, [(between, [a, b])]) = (axes.of_beam, ring.between.as_slice()) {
-        let mean = vec![(*a, 1.0 / 6.0), (*between, 4.0 / 6.0), (*b, 1.0 / 6.0)];
-        deck.means.insert(node, mean);
+    if let [(between, [a, b])] = ring.between.as_slice() {
+        deck.means.insert(node, ring.mean());
         // Forces are shared as those of an even traction over the face of a C3D20 are.
         deck.shares.insert(node, vec![(*a, -0.5), (*between, 2.0), (*b, -0.5)]);
     }
-    ring
+}
+
+impl Ring {
+    /// What CalculiX prints: the mean of the outer nodes; of the corner of a quadratic shell, that
+    /// over its thickness.
+    fn mean(&self) -> Vec<(u32, f64)> {
+        match self.between.as_slice() {
+            [(between, [a, b])] => vec![(*a, 1.0 / 6.0), (*between, 4.0 / 6.0), (*b, 1.0 / 6.0)],
+            _ => self.outer.iter().map(|&n| (n, 1.0 / self.outer.len() as f64)).collect(),
+        }
+    }
+}
+
+/// Main axes of a cloud of places, the widest first, and along how many of them it has an extent.
+fn spread(places: &[DVec3]) -> ([DVec3; 3], usize) {
+    let middle = places.iter().sum::<DVec3>() / places.len() as f64;
+    let mut moments = Matrix3::zeros();
+    for &place in places {
+        let arm = Vector3::from((place - middle).to_array());
+        moments += arm * arm.transpose();
+    }
+    let eigen = moments.symmetric_eigen();
+    let mut order = [0usize, 1, 2];
+    order.sort_by(|&i, &j| eigen.eigenvalues[j].total_cmp(&eigen.eigenvalues[i]));
+    let least = NO_SPREAD * eigen.eigenvalues[order[0]];
+    let extent = order.iter().filter(|&&i| eigen.eigenvalues[i] > least).count();
+    let axis = |i: usize| DVec3::from_array(eigen.eigenvectors.column(i).into_owned().into());
+    (order.map(axis), extent)
+}
+
+/// a bᵀ
+fn dyad(a: DVec3, b: DVec3) -> DMat3 {
+    DMat3::from_cols(b.x * a, b.y * a, b.z * a)
 }
 
 /// Points of integration and the material and axes at each, where they are not those of the shape.
@@ -342,10 +506,11 @@ type Integration = (Vec<Point>, Vec<(u32, Option<u32>)>);
 fn integration(thin: Thin, section: &Section) -> Integration {
     match &section.profile {
         Profile::Shell { layers, .. } if !layers.is_empty() => layered(thin.shape(), layers),
-        Profile::Beam { size, hollow: Some(hollow), .. } => {
-            let around = match *hollow {
-                Hollow::Pipe(wall) => pipe(size[0], wall),
-                Hollow::Box(wall) => walls(*size, wall),
+        &Profile::Beam { size, form: form @ (Form::Pipe(_) | Form::Box(_)), .. } => {
+            let around = match form {
+                Form::Box(thick) => walls(size, thick),
+                Form::Pipe(wall) => pipe(size[0], wall),
+                Form::Full | Form::Round => Vec::new(),
             };
             let row = |&(x, w): &(f64, f64)| {
                 around.iter().map(move |&([y, z], v)| ([x, y, z], w * v)).collect::<Vec<_>>()
@@ -386,15 +551,15 @@ fn pipe(diameter: f64, wall: f64) -> Vec<([f64; 2], f64)> {
 }
 
 /// Simpson's rule of five points along the middle of each of four walls.
-fn walls([a, b]: [f64; 2], wall: f64) -> Vec<([f64; 2], f64)> {
-    let (z, y) = (1.0 - wall / a, 1.0 - wall / b);
-    let corners = [[y, z], [-y, z], [-y, -z], [y, -z]];
-    // Natural area of a unit of length of a wall, by the wall that it is.
-    let width = [2.0 * wall / a, 2.0 * wall / b];
+fn walls([a, b]: [f64; 2], thick: [f64; 4]) -> Vec<([f64; 2], f64)> {
+    let across = [a, b, a, b];
+    let [up, left, down, right]: [f64; 4] = std::array::from_fn(|k| 1.0 - thick[k] / across[k]);
+    let corners = [[right, up], [-left, up], [-left, -down], [right, -down]];
+    // Natural area of a wall's share.
     let weight = |k: usize, share: f64| {
         let (from, to) = (corners[k % 4], corners[(k + 1) % 4]);
         let length = (to[0] - from[0]).abs() + (to[1] - from[1]).abs();
-        length * width[k % 2] * share / 12.0
+        length * 2.0 * thick[k % 4] / across[k % 4] * share / 12.0
     };
     let mut points = Vec::with_capacity(16);
     for k in 0..4 {
@@ -408,6 +573,3 @@ fn walls([a, b]: [f64; 2], wall: f64) -> Vec<([f64; 2], f64)> {
     }
     points
 }
-
-/// Rings by node.
-pub(super) type Rings = HashMap<u32, Ring>;
