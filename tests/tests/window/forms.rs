@@ -195,6 +195,9 @@ fn a_new_structure_is_seen_before_it_is_made() {
     window.click("New structure…");
     window.until_seen("Preview");
     window.until_seen("height");
+    window.click("Browse…");
+    window.frames(2);
+    assert!(has(&window, "type the folder's name instead"));
     let place = folder.path().join("pier");
     type_into(&mut window, "Folder to make", &place.display().to_string());
     type_into(&mut window, "title", "Pier 7");
