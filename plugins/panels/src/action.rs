@@ -18,7 +18,7 @@ use crate::{
     command::Palette,
     create::Creation,
     ct::Ct,
-    dialog::{Dialogs, Purpose},
+    dialog::{Dialogs, Purpose, Whose},
     edits::{self, Edit},
     export::Export,
     history::History,
@@ -28,6 +28,7 @@ use crate::{
     play,
     recent::Recent,
     reference::{self, Reference},
+    report::Report,
     saving::{Saving, Taken},
     structure::{self, Structure},
     trail,
@@ -164,6 +165,10 @@ pub enum Action {
     Save(Taken),
     /// Choose that place in a dialog.
     ChooseSave,
+    /// Choose in a dialog the folder that the Report tab writes.
+    ChooseReportFolder,
+    /// Choose in a dialog where the folder of a new structure is made.
+    ChooseStructureFolder,
     /// Write the window as it is seen, or one panel of it, as PNG.
     TakePicture(PathBuf, Option<String>),
     /// Write all pictures that can be made of the scene into a folder, as PNG.
@@ -229,9 +234,20 @@ fn carry_out(world: &mut World, action: Action) {
         }
         Action::ChooseSave => {
             let saving = world.resource::<Saving>();
-            let purpose = if saving.is_folder() { Purpose::Folder } else { Purpose::Take };
-            let purpose = purpose(saving.proposal());
+            let proposal = saving.proposal();
+            let purpose = match saving.is_folder() {
+                true => Purpose::Folder(Whose::Sheet, proposal),
+                false => Purpose::Take(proposal),
+            };
             Dialogs::open(world, purpose);
+        }
+        Action::ChooseReportFolder => {
+            let proposal = world.resource::<Report>().proposal();
+            Dialogs::open(world, Purpose::Folder(Whose::Report, proposal));
+        }
+        Action::ChooseStructureFolder => {
+            let proposal = world.resource::<Creation>().proposal();
+            Dialogs::open(world, Purpose::Folder(Whose::Structure, proposal));
         }
         Action::TakePicture(path, panel) => take_picture(world, Some(path), panel),
         Action::TakeViews(folder) => world.resource_mut::<Saving>().take_views(folder),

@@ -4,12 +4,13 @@
 use std::path::{Path, PathBuf};
 
 use bevy_ecs::prelude::*;
-use egui::{Button, ScrollArea, TextEdit, Ui, vec2};
+use egui::{Button, ScrollArea, Ui, vec2};
 use intrados_scene::attach::{Draft, Setting};
 use intrados_stage::{Jobs, Task};
 
 use crate::{
     Action, Actions,
+    destination::Destination,
     lang::{fixed, term},
     structure::Preview,
     values::Values,
@@ -19,6 +20,8 @@ use crate::{
 const SIZE: (f32, f32) = (860.0, 560.0);
 /// What lies above and below the fields, points.
 const AROUND: f32 = 150.0;
+/// What the name and the button beside the field of the folder take each, points.
+const BESIDE: f32 = 120.0;
 
 /// The dialog.
 #[derive(Resource, Default)]
@@ -27,7 +30,7 @@ pub(crate) struct Creation {
     kind: &'static str,
     values: Values,
     /// Where it will be; as it was proposed, until somebody types.
-    folder: String,
+    to: Destination,
     proposed: String,
     draft: Option<Draft>,
     preview: Preview,
@@ -51,13 +54,26 @@ impl Creation {
     }
 
     fn choose(&mut self, kind: &'static str) {
-        if self.folder == self.proposed {
-            self.proposed = free(kind).display().to_string();
-            self.folder.clone_from(&self.proposed);
+        if self.to.path == self.proposed {
+            let home = dirs::document_dir().or_else(dirs::home_dir).unwrap_or_default();
+            self.proposed = free(&home, kind).display().to_string();
+            self.to.path.clone_from(&self.proposed);
         }
         (self.kind, self.values) = (kind, Values::default());
         (self.draft, self.tried, self.drafting) = (None, None, None);
         self.why.clear();
+    }
+
+    /// Where it would go.
+    pub(crate) fn proposal(&self) -> String {
+        self.to.path.clone()
+    }
+
+    /// A folder of the same name where a dialog says.
+    pub(crate) fn put(&mut self, above: &Path) {
+        let name = Path::new(self.to.path.trim()).file_name().map(|n| n.to_string_lossy());
+        let folder = free(above, name.as_deref().unwrap_or(self.kind));
+        self.to.propose(folder.display().to_string());
     }
 
     /// Makes the draft anew where something else has been typed.
@@ -84,17 +100,16 @@ impl Creation {
 
     fn make(&mut self, jobs: &mut Jobs) {
         let Some(draft) = self.draft.clone() else { return };
-        let folder = PathBuf::from(self.folder.trim());
+        let folder = PathBuf::from(self.to.path.trim());
         self.making = Some(Task::spawn(jobs, tr!("making the structure"), move |_| {
             draft.write(&folder).map_err(|why| why.to_string())
         }));
     }
 }
 
-/// A folder that is not there yet, among the user's documents.
-fn free(kind: &str) -> PathBuf {
-    let home = dirs::document_dir().or_else(dirs::home_dir).unwrap_or_default();
-    let named = |n: u32| if n == 1 { home.join(kind) } else { home.join(format!("{kind} {n}")) };
+/// A folder of this name, or numbered, that is not there yet.
+fn free(above: &Path, name: &str) -> PathBuf {
+    let named = |n: u32| if n == 1 { above.join(name) } else { above.join(format!("{name} {n}")) };
     (1..100).map(named).find(|path| !path.exists()).unwrap_or_else(|| named(1))
 }
 
@@ -123,7 +138,12 @@ pub(crate) fn take(mut creation: ResMut<Creation>, mut actions: ResMut<Actions>)
 }
 
 /// Draws it.
-pub(crate) fn dialog(InMut(ui): InMut<Ui>, mut creation: ResMut<Creation>, mut jobs: ResMut<Jobs>) {
+pub(crate) fn dialog(
+    InMut(ui): InMut<Ui>,
+    mut creation: ResMut<Creation>,
+    mut jobs: ResMut<Jobs>,
+    mut actions: ResMut<Actions>,
+) {
     let creation = creation.bypass_change_detection();
     let jobs = jobs.bypass_change_detection();
     let screen = ui.ctx().content_rect();
@@ -162,23 +182,27 @@ pub(crate) fn dialog(InMut(ui): InMut<Ui>, mut creation: ResMut<Creation>, mut j
     });
     creation.draft(jobs);
     ui.separator();
-    send(ui, creation, jobs);
+    send(ui, creation, jobs, &mut actions);
 }
 
 /// Where it goes, the buttons, and what keeps them from being pressed.
-fn send(ui: &mut Ui, creation: &mut Creation, jobs: &mut Jobs) {
-    ui.horizontal(|ui| {
-        let label = ui.label(tr!("Folder to make"));
-        let width = (ui.available_width() - 12.0).max(80.0);
-        let field = TextEdit::singleline(&mut creation.folder).desired_width(width);
-        ui.add(field).labelled_by(label.id);
+fn send(ui: &mut Ui, creation: &mut Creation, jobs: &mut Jobs, actions: &mut Actions) {
+    let is_entered = ui.horizontal(|ui| {
+        let width = (ui.available_width() - 2.0 * BESIDE).max(80.0);
+        let is_entered = creation.to.field(ui, tr!("Folder to make"), width);
+        if ui.button(tr!("Browse…")).clicked() {
+            actions.ask(Action::ChooseStructureFolder);
+        }
+        is_entered
     });
-    let is_there = Path::new(creation.folder.trim()).exists();
+    let is_entered = is_entered.inner;
+    let is_there = Path::new(creation.to.path.trim()).exists();
     let is_current = !creation.is_busy() && creation.why.is_empty() && creation.draft.is_some();
     ui.horizontal_wrapped(|ui| {
-        let may = is_current && !is_there && !creation.folder.trim().is_empty();
+        let may = is_current && !is_there && !creation.to.path.trim().is_empty();
         let hint = tr!("Makes the folder, with scene.ron and evidence.ron in it, and opens it");
-        if ui.add_enabled(may, Button::new(tr!("Make it"))).on_hover_text(hint).clicked() {
+        let make = ui.add_enabled(may, Button::new(tr!("Make it"))).on_hover_text(hint);
+        if make.clicked() || is_entered && may {
             creation.make(jobs);
         }
         if ui.button(tr!("Cancel")).clicked() {
@@ -201,4 +225,21 @@ fn measures(draft: &Draft) -> String {
     let count = members.len();
     let of = if count == 1 { tr!("one member") } else { tr!("{} members", count) };
     tr!("{}, {} m³ of concrete, {} t", of, fixed(volume, 2), fixed(2.5 * volume, 1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_structure_gets_a_folder_of_its_own_where_somebody_says() {
+        let above = tempfile::tempdir().unwrap();
+        let mut creation = Creation::default();
+        creation.to.path = "elsewhere/pier ".into();
+        creation.put(above.path());
+        assert_eq!(Path::new(&creation.to.path), above.path().join("pier"));
+        std::fs::create_dir(above.path().join("pier")).unwrap();
+        creation.put(above.path());
+        assert_eq!(Path::new(&creation.to.path), above.path().join("pier 2"));
+    }
 }

@@ -1,5 +1,7 @@
 //! Where something is written: the field that asks for it.
 
+use std::path::{Path, PathBuf};
+
 use egui::{
     Key, TextEdit, Ui,
     text::{CCursor, CCursorRange},
@@ -25,10 +27,16 @@ impl Destination {
         self.is_new = true;
     }
 
-    /// Draws the field; whether Enter was pressed in it.
-    pub(crate) fn field(&mut self, ui: &mut Ui, name: String) -> bool {
+    /// Proposes the folder that a dialog has brought, or one in it.
+    pub(crate) fn put_folder(&mut self, folder: PathBuf) {
+        let folder = inside(folder, &self.path);
+        self.propose(folder.display().to_string());
+    }
+
+    /// Draws the field, so many points wide; whether Enter was pressed in it.
+    pub(crate) fn field(&mut self, ui: &mut Ui, name: String, width: f32) -> bool {
         let label = ui.label(name);
-        let field = TextEdit::singleline(&mut self.path).desired_width(280.0);
+        let field = TextEdit::singleline(&mut self.path).desired_width(width);
         let field = ui.add(field).labelled_by(label.id);
         // A window is drawn once for its size alone, before anybody sees it.
         if self.is_new && !ui.is_sizing_pass() {
@@ -41,6 +49,17 @@ impl Destination {
             }
         }
         field.lost_focus() && ui.input(|i| i.key_pressed(Key::Enter))
+    }
+}
+
+/// The folder that is written where somebody has chosen one: itself where it is empty or of the
+/// proposal's name, or else one of that name in it, so that files of others are not mixed with ours.
+fn inside(folder: PathBuf, proposal: &str) -> PathBuf {
+    let name = Path::new(proposal.trim()).file_name();
+    let is_empty = folder.read_dir().is_ok_and(|mut files| files.next().is_none());
+    match name {
+        Some(name) if !is_empty && folder.file_name() != Some(name) => folder.join(name),
+        _ => folder,
     }
 }
 
@@ -62,5 +81,19 @@ mod tests {
         assert_eq!(stem("bridge-damage"), [0, 13]);
         assert_eq!(stem("out/.csv"), [4, 8]);
         assert_eq!(stem(""), [0, 0]);
+    }
+
+    #[test]
+    fn a_folder_with_files_of_others_gets_one_of_its_own() {
+        let folder = tempfile::tempdir().unwrap();
+        let chosen = folder.path().to_owned();
+        assert_eq!(inside(chosen.clone(), "bridge-damage"), chosen);
+        std::fs::write(chosen.join("letter.txt"), "").unwrap();
+        let own = chosen.join("bridge-damage");
+        assert_eq!(inside(chosen.clone(), "elsewhere/bridge-damage "), own);
+        std::fs::create_dir(&own).unwrap();
+        std::fs::write(own.join("report.html"), "").unwrap();
+        assert_eq!(inside(own.clone(), "bridge-damage"), own);
+        assert_eq!(inside(chosen.clone(), ""), chosen);
     }
 }

@@ -8,7 +8,10 @@ use std::{
 use bevy_ecs::prelude::*;
 use intrados_stage::{Jobs, Task};
 
-use crate::{Action, Actions, Banners, Log, attach::Form, export::Export, saving::Saving};
+use crate::{
+    Action, Actions, Banners, Log, attach::Form, create::Creation, export::Export, report::Report,
+    saving::Saving,
+};
 
 /// A dialog that is gone sooner than anybody can click was never there.
 const TOO_SOON: Duration = Duration::from_millis(400);
@@ -38,8 +41,19 @@ pub(crate) enum Purpose {
     Save(String),
     /// The same of what is no picture of light.
     Take(String),
-    /// The same of what is a folder of files.
-    Folder(String),
+    /// The same of what is a folder of files, and whose.
+    Folder(Whose, String),
+}
+
+/// Who writes a folder of files.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Whose {
+    /// The sheet that saves something.
+    Sheet,
+    /// The Report tab.
+    Report,
+    /// A new structure.
+    Structure,
 }
 
 impl Purpose {
@@ -69,7 +83,7 @@ impl Purpose {
                 .add_filter(tr!("EXR, with all data"), &["exr"])
                 .set_file_name(name),
             Self::Take(name) => dialog.set_title(tr!("Save")).set_file_name(name),
-            Self::Folder(name) => {
+            Self::Folder(_, name) => {
                 let dialog =
                     dialog.set_title(tr!("Folder to write")).set_can_create_directories(true);
                 let proposed = std::path::absolute(name.trim()).unwrap_or_default();
@@ -111,7 +125,7 @@ impl Dialogs {
         let task = Task::spawn_unlisted(&mut jobs, tr!("file dialog"), move |_| match theirs {
             Purpose::Evidence => dialog.pick_files().unwrap_or_default(),
             Purpose::Save(_) | Purpose::Take(_) => dialog.save_file().into_iter().collect(),
-            Purpose::Folder(_) => dialog.pick_folder().into_iter().collect(),
+            Purpose::Folder(..) => dialog.pick_folder().into_iter().collect(),
             Purpose::Open | Purpose::Photograph | Purpose::Prediction => {
                 dialog.pick_file().into_iter().collect()
             }
@@ -150,7 +164,7 @@ fn is_missing(purpose: &Purpose, banners: &mut Banners, log: &mut Log) {
         Purpose::Photograph => tr!("drop the photograph on the window, or type its path"),
         Purpose::Prediction => tr!("drop its predict.json on the window"),
         Purpose::Save(_) | Purpose::Take(_) => tr!("type the file's name instead"),
-        Purpose::Folder(_) => tr!("type the folder's name instead"),
+        Purpose::Folder(..) => tr!("type the folder's name instead"),
     };
     log.say(tr!("no file dialog on this system: {}", instead));
     banners.cannot(&tr!("No file dialog on this system"), &instead);
@@ -163,6 +177,8 @@ pub(crate) fn take(
     mut export: ResMut<Export>,
     mut form: ResMut<Form>,
     mut saving: ResMut<Saving>,
+    mut report: ResMut<Report>,
+    mut creation: ResMut<Creation>,
     mut banners: ResMut<Banners>,
     mut log: ResMut<Log>,
 ) {
@@ -178,7 +194,9 @@ pub(crate) fn take(
         (Purpose::Open, Some(path)) => actions.ask(Action::Open(path)),
         (Purpose::Photograph, Some(path)) => actions.ask(Action::Photograph(path)),
         (Purpose::Prediction, Some(path)) => actions.ask(Action::Compare(path)),
-        (Purpose::Take(_) | Purpose::Folder(_), Some(path)) => saving.put(path),
+        (Purpose::Take(_) | Purpose::Folder(Whose::Sheet, _), Some(path)) => saving.put(path),
+        (Purpose::Folder(Whose::Report, _), Some(path)) => report.put(path),
+        (Purpose::Folder(Whose::Structure, _), Some(path)) => creation.put(&path),
         (Purpose::Save(_), Some(path)) => export.to.propose(path.display().to_string()),
         (purpose, None) if since.elapsed() < TOO_SOON => {
             is_missing(purpose, &mut banners, &mut log)

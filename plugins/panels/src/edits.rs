@@ -196,7 +196,7 @@ pub(crate) fn take(
     let Ok(done) = done else { return };
     let said = match done {
         Outcome::Made(change, deed, notes) => {
-            notes.iter().for_each(|note| log.say(tr!("note: {}", note)));
+            notes.iter().for_each(|note| log.say(tr!("note: {}", term(note))));
             let named = Named { change, what: deed.said() };
             let said = tr!("done: {}", named.what);
             edits.taken_back.clear();

@@ -78,7 +78,7 @@ pub(crate) fn sheet(
          orders."
     ));
     let is_entered = ui.horizontal(|ui| {
-        let is_entered = export.to.field(ui, tr!("File name"));
+        let is_entered = export.to.field(ui, tr!("File name"), 280.0);
         if ui.button(tr!("Browse…")).clicked() {
             actions.ask(Action::ChooseExport);
         }

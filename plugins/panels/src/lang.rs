@@ -348,6 +348,7 @@ mod tests {
         assert_eq!(values("{}", "a text that would be sought for ever"), None);
         speak(Language::German);
         let said = term("reading slice 3 of 10");
+        assert_eq!(term("width: “wide” is no number"), "Breite: „wide“ ist keine Zahl");
         speak(Language::English);
         assert_eq!(said, "Schnittbild 3 von 10 wird ausgewertet");
         assert_eq!(term("a name | of another"), "a name | of another");

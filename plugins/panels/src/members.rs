@@ -1,13 +1,14 @@
 //! The member tree.
 
 use bevy_ecs::prelude::*;
-use egui::{ScrollArea, Ui};
+use egui::{Label, Role, ScrollArea, Ui, WidgetInfo};
 use intrados_scene::{Member, MemberKind, Scene, plugin::CurrentScene};
 
 use crate::{
     Action, Actions, Latest, Selection, colours,
     lang::{fixed, term},
     plus_minus,
+    sheet::Properties,
 };
 
 /// Plural, for the group's heading.
@@ -63,6 +64,7 @@ pub(crate) fn members(
     scene: Option<Res<CurrentScene>>,
     selection: Res<Selection>,
     latest: Res<Latest>,
+    properties: Res<Properties>,
     mut actions: ResMut<Actions>,
 ) {
     let Some(scene) = scene else { return };
@@ -84,7 +86,8 @@ pub(crate) fn members(
             let heading = format!("{} ({})", plural(kind), group.len());
             egui::CollapsingHeader::new(heading).id_salt(kind).default_open(open).show(ui, |ui| {
                 for (index, member) in group {
-                    row(ui, index, member, *selection, &latest, &mut actions);
+                    let is_typed = properties.is_typed(scene, &member.id);
+                    row(ui, (index, member), is_typed, *selection, &latest, &mut actions);
                 }
             });
         }
@@ -93,8 +96,8 @@ pub(crate) fn members(
 
 fn row(
     ui: &mut Ui,
-    index: usize,
-    member: &Member,
+    (index, member): (usize, &Member),
+    is_typed: bool,
     selection: Selection,
     latest: &Latest,
     actions: &mut Actions,
@@ -115,6 +118,12 @@ fn row(
                 );
                 ui.label(fixed(damage.value, 2)).on_hover_text(hint);
                 colours::severity(ui, verdict, steps);
+            }
+            if is_typed {
+                let mark = ui.add(Label::new("✏").selectable(false));
+                let what = tr!("Something is typed into its form and not applied");
+                mark.widget_info(|| WidgetInfo::labeled(Role::Label, true, &what));
+                mark.on_hover_text(&what);
             }
             let rest = egui::Layout::left_to_right(egui::Align::Center)
                 .with_main_justify(true)

@@ -10,7 +10,7 @@ use intrados_scene::{
     plugin::{CurrentScene, SceneIndex},
 };
 
-use crate::{Log, toast::Toasts};
+use crate::{Log, lang::term, toast::Toasts};
 
 /// The newest prediction.
 #[derive(Resource, Default)]
@@ -126,7 +126,7 @@ pub(crate) fn gather(
     latest.states =
         progress.profile().into_iter().flat_map(|p| &p.states).map(|s| s.name.clone()).collect();
     for failure in progress.failures().iter().skip(latest.failures.len()) {
-        log.say(format!("⚠ {failure}"));
+        log.say(format!("⚠ {}", term(&failure.to_string())));
         latest.failures.push(failure.to_string());
     }
     for (index, one) in &predicted {

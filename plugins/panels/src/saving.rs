@@ -2,7 +2,7 @@
 
 use std::{
     io::Write,
-    path::{Path, PathBuf},
+    path::PathBuf,
     sync::{Arc, Mutex, PoisonError, mpsc},
     time::{Duration, Instant},
 };
@@ -110,8 +110,10 @@ impl Saving {
 
     /// Where a dialog says.
     pub(crate) fn put(&mut self, path: PathBuf) {
-        let path = if self.is_folder() { inside(path, &self.to.path) } else { path };
-        self.to.propose(path.display().to_string());
+        match self.is_folder() {
+            true => self.to.put_folder(path),
+            false => self.to.propose(path.display().to_string()),
+        }
     }
 
     /// Takes a picture of the window, or of what is at a place in it, in the next frame, for a file
@@ -129,17 +131,6 @@ impl Saving {
     pub(crate) fn takes_panel(&self) -> bool {
         self.wanted.as_ref().is_some_and(|(_, of)| of.is_some())
             && self.since.is_some_and(|since| since.elapsed() < AWAY)
-    }
-}
-
-/// The folder that is written where somebody has chosen one: itself where it is empty or of the
-/// proposal's name, or else one of that name in it, so that files of others are not mixed with ours.
-fn inside(folder: PathBuf, proposal: &str) -> PathBuf {
-    let name = Path::new(proposal.trim()).file_name();
-    let is_empty = folder.read_dir().is_ok_and(|mut files| files.next().is_none());
-    match name {
-        Some(name) if !is_empty && folder.file_name() != Some(name) => folder.join(name),
-        _ => folder,
     }
 }
 
@@ -218,7 +209,7 @@ pub(crate) fn sheet(
     });
     let name = if what.is_folder() { tr!("Folder to write") } else { tr!("File to write") };
     let is_entered = ui.horizontal(|ui| {
-        let is_entered = saving.to.field(ui, name);
+        let is_entered = saving.to.field(ui, name, 280.0);
         if ui.button(tr!("Browse…")).clicked() {
             actions.ask(Action::ChooseSave);
         }
@@ -409,20 +400,6 @@ mod tests {
     use egui::{Color32, pos2};
 
     use super::*;
-
-    #[test]
-    fn a_folder_with_files_of_others_gets_one_of_its_own() {
-        let folder = tempfile::tempdir().unwrap();
-        let chosen = folder.path().to_owned();
-        assert_eq!(inside(chosen.clone(), "bridge-damage"), chosen);
-        std::fs::write(chosen.join("letter.txt"), "").unwrap();
-        let own = chosen.join("bridge-damage");
-        assert_eq!(inside(chosen.clone(), "elsewhere/bridge-damage "), own);
-        std::fs::create_dir(&own).unwrap();
-        std::fs::write(own.join("report.html"), "").unwrap();
-        assert_eq!(inside(own.clone(), "bridge-damage"), own);
-        assert_eq!(inside(chosen.clone(), ""), chosen);
-    }
 
     #[test]
     fn a_picture_is_cut_in_pixels_and_never_beyond_its_rim() {

@@ -39,9 +39,9 @@ struct Kept {
     member: Option<String>,
     /// The form of evidence, where it is open.
     form: Option<Form>,
-    /// What has been typed into the sheet's form and is not applied.
+    /// What has been typed into forms of the sheet and is not applied.
     #[serde(default)]
-    sheet: Option<Unapplied>,
+    typed: Vec<Unapplied>,
     photograph: Option<KeptPhotograph>,
 }
 
@@ -148,8 +148,8 @@ pub(crate) fn keep(
         if let Some(left) = kept.form {
             *form = left;
         }
-        if let Some(left) = kept.sheet {
-            properties.go_on(&scene.0, left);
+        if !kept.typed.is_empty() {
+            properties.go_on(&scene.0, kept.typed);
         }
         if let Some(left) = kept.photograph {
             let pick = |(pixel, place): ([f64; 2], [f64; 3])| Pick { pixel, place: place.into() };
@@ -179,7 +179,7 @@ fn of(
         scene: std::path::absolute(&scene.path).unwrap_or_else(|_| scene.path.clone()),
         member: selection.0.and_then(|i| scene.members.get(i)).map(|m| m.id.clone()),
         form: form.is_open.then(|| form.clone()),
-        sheet: properties.unapplied(scene),
+        typed: properties.unapplied(scene),
         photograph: photos.unsaved().map(|(file, all)| KeptPhotograph { file, picks: picks(all) }),
     }
 }
@@ -190,7 +190,7 @@ pub(crate) fn offer(ui: &mut Ui, world: &mut World) {
     Side::top("session").show(ui, |ui| {
         ui.horizontal_wrapped(|ui| {
             ui.label(tr!("The last session was not ended: {}.", left.scene.display()));
-            if left.form.is_some() || left.sheet.is_some() || left.photograph.is_some() {
+            if left.form.is_some() || !left.typed.is_empty() || left.photograph.is_some() {
                 ui.label(tr!("What was filled in there and not saved is kept."));
             }
             let session = &mut *world.resource_mut::<Session>();
@@ -217,7 +217,7 @@ mod tests {
             scene: scene.into(),
             member: Some("C1".into()),
             form: Some(form),
-            sheet: None,
+            typed: Vec::new(),
             photograph: Some(KeptPhotograph {
                 file: "a.jpg".into(),
                 picks: vec![([1.5, 2.0], [0.1, 0.2, 0.3])],

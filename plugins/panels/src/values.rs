@@ -8,6 +8,8 @@ use crate::lang::term;
 
 /// Width of a field, points, and of one that holds words.
 const WIDTHS: (f32, f32) = (70.0, 120.0);
+/// Width of a field's own margins, points.
+const INSET: f32 = 8.0;
 /// So many changed fields are named in the line that can be undone.
 const NAMED: usize = 3;
 
@@ -18,7 +20,16 @@ pub(crate) struct Typed {
     place: usize,
     group: String,
     name: String,
+    /// What was written there.
+    written: String,
     text: String,
+}
+
+impl Typed {
+    fn is_of(&self, field: &Field) -> bool {
+        let own = (&self.group, &self.name, &self.written);
+        own == (&field.group, &field.name, &field.value)
+    }
 }
 
 /// Fields, and what has been typed into each.
@@ -38,18 +49,20 @@ impl Values {
         self.fields.is_empty()
     }
 
-    /// Takes the fields as the file has them now. What has been typed stays where the file still
+    /// The fields as the file has them now. What has been typed is there again where the file still
     /// says what it did.
-    pub(crate) fn renew(&mut self, fields: Vec<Field>) {
-        let before = std::mem::replace(self, Self::new(fields));
-        let typed = before.fields.iter().zip(before.texts);
-        for ((old, text), (new, own)) in typed.zip(self.fields.iter().zip(&mut self.texts)) {
-            let is_same =
-                (&old.group, &old.name, &old.value) == (&new.group, &new.name, &new.value);
-            if is_same {
-                *own = text;
+    pub(crate) fn again(fields: Vec<Field>, typed: &[Typed]) -> Self {
+        let mut values = Self::new(fields);
+        for typed in typed {
+            let all = values.fields.iter().enumerate();
+            let own = all.filter(|(_, field)| typed.is_of(field));
+            // Others may have come before it since.
+            let nearest = own.map(|(place, _)| place).min_by_key(|p| p.abs_diff(typed.place));
+            if let Some(text) = nearest.and_then(|place| values.texts.get_mut(place)) {
+                text.clone_from(&typed.text);
             }
         }
+        values
     }
 
     /// Back to what is written.
@@ -70,20 +83,10 @@ impl Values {
                 place,
                 group: field.group.clone(),
                 name: field.name.clone(),
+                written: field.value.clone(),
                 text: text.clone(),
             })
             .collect()
-    }
-
-    /// Types it again, into the same fields as far as they are still there.
-    pub(crate) fn type_again(&mut self, typed: &[Typed]) {
-        for Typed { place, group, name, text } in typed {
-            let field = self.fields.get(*place);
-            let is_same = field.is_some_and(|f| (&f.group, &f.name) == (group, name));
-            if let Some(own) = self.texts.get_mut(*place).filter(|_| is_same) {
-                own.clone_from(text);
-            }
-        }
     }
 
     fn pairs(&self) -> impl Iterator<Item = (&Field, &String)> {
@@ -92,12 +95,9 @@ impl Values {
 
     /// What is to be written, and the names of what changes; or what has to be typed otherwise.
     pub(crate) fn settings(&self) -> Result<(Vec<Setting>, String), String> {
-        let mut settings = Vec::new();
-        let mut names = Vec::new();
-        for (field, text) in self.pairs() {
-            settings.extend(field.set(text)?);
-            names.push(term(&field.name));
-        }
+        let changes: Vec<(&Field, &str)> = self.pairs().map(|(f, text)| (f, &**text)).collect();
+        let settings = Field::set_all(&changes)?;
+        let mut names: Vec<String> = changes.iter().map(|(f, _)| term(&f.name)).collect();
         let more = names.len().saturating_sub(NAMED);
         names.truncate(NAMED);
         let named = names.join(", ");
@@ -123,29 +123,52 @@ impl Values {
             let column = (0.5 * ui.available_width() - 6.0).max(60.0);
             let grid = Grid::new(&group).num_columns(2).max_col_width(column);
             grid.spacing([8.0, 3.0]).show(ui, |ui| {
-                let rows = self.fields[range.clone()].iter().zip(&mut self.texts[range]);
-                rows.for_each(|(field, text)| row(ui, field, text));
+                let fields = &self.fields[range.clone()];
+                let mut is_cut = false;
+                for (k, (field, text)) in fields.iter().zip(&mut self.texts[range]).enumerate() {
+                    is_cut |= row(ui, field, text);
+                    // What is said of several is said once, below the last of them.
+                    if fields.get(k + 1).is_none_or(|next| next.note != field.note) {
+                        if is_cut && !(is_common && own > 1) {
+                            note(ui, field);
+                        }
+                        is_cut = false;
+                    }
+                }
             });
             from += own;
         }
     }
 }
 
-/// A value with its name and its unit.
-fn row(ui: &mut Ui, field: &Field, text: &mut String) {
+/// What a field is too narrow to say of itself.
+fn note(ui: &mut Ui, field: &Field) {
+    ui.allocate_exact_size(egui::Vec2::ZERO, egui::Sense::hover());
+    ui.weak(term(&field.note));
+    ui.end_row();
+}
+
+/// A value with its name and its unit; whether it is empty, and too narrow for its note.
+fn row(ui: &mut Ui, field: &Field, text: &mut String) -> bool {
     let is_changed = field.value != text.trim();
     let name = RichText::new(term(&field.name));
     let label = ui.label(if is_changed { name.strong() } else { name });
     let note = term(&field.note);
     let label = if note.is_empty() { label } else { label.on_hover_text(&note) };
-    ui.horizontal(|ui| {
+    let is_cut = ui.horizontal(|ui| {
         let width = match field.kind {
             FieldKind::Text | FieldKind::OneOf(_) | FieldKind::Choice(_) => WIDTHS.1,
             FieldKind::Number | FieldKind::Whole | FieldKind::Day => WIDTHS.0,
         };
         let choice = if matches!(field.kind, FieldKind::OneOf(_)) { 26.0 } else { 0.0 };
         let width = width.min(ui.available_width() - choice).max(40.0);
-        let hint = if field.kind == FieldKind::Day { "2026-05-03" } else { note.as_str() };
+        let is_day = field.kind == FieldKind::Day;
+        let is_cut = !is_day && text.is_empty() && width_of(ui, &note) > width - INSET;
+        let hint = match is_day {
+            true => "2026-05-03",
+            false if is_cut => "",
+            false => note.as_str(),
+        };
         let response = match &field.kind {
             FieldKind::Choice(names) => pick(ui, field, names, width, text),
             _ => ui.add(TextEdit::singleline(text).desired_width(width).hint_text(hint)),
@@ -160,8 +183,17 @@ fn row(ui: &mut Ui, field: &Field, text: &mut String) {
         if !field.unit.is_empty() {
             ui.label(term(field.unit));
         }
+        is_cut
     });
     ui.end_row();
+    is_cut.inner
+}
+
+/// Width of a text in a line, points.
+fn width_of(ui: &Ui, text: &str) -> f32 {
+    let text = egui::WidgetText::from(text);
+    let mode = Some(egui::TextWrapMode::Extend);
+    text.into_galley(ui, mode, f32::INFINITY, egui::TextStyle::Body).size().x
 }
 
 /// A list of what there is.
@@ -208,18 +240,17 @@ mod tests {
         values.texts[1].push('7');
         let typed = values.typed();
         assert_eq!(typed.len(), 1);
-        let mut again = Values::new(all.clone());
-        again.type_again(&typed);
+        let again = Values::again(all.clone(), &typed);
         assert_eq!((again.changed(), &again.texts), (1, &values.texts));
+        // Another field has come before it.
         let mut now = all;
-        again.renew(now.clone());
-        assert_eq!((again.changed(), &again.texts), (1, &values.texts));
+        now.insert(0, now[0].clone());
+        let again = Values::again(now.clone(), &typed);
+        assert_eq!((again.changed(), &again.texts[2]), (1, &values.texts[1]));
         // Somebody has written another value there meanwhile.
-        now[1].value.push('9');
-        again.renew(now.clone());
-        assert_eq!((again.changed(), &again.texts[1]), (0, &now[1].value));
-        let mut other = Values::new(fields(&scene, None));
-        other.type_again(&typed);
-        assert_eq!(other.changed(), 0);
+        now[2].value.push('9');
+        let again = Values::again(now.clone(), &typed);
+        assert_eq!((again.changed(), &again.texts[2]), (0, &now[2].value));
+        assert_eq!(Values::again(fields(&scene, None), &typed).changed(), 0);
     }
 }

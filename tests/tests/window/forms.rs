@@ -133,6 +133,63 @@ fn what_is_typed_stays_while_evidence_is_attached() {
     assert!(has(&window, "as in lonely.ron"));
 }
 
+/// What has been typed stays while another form is looked at and applied; the tree and that form say
+/// that it waits, until it is discarded.
+#[test]
+fn what_is_typed_waits_while_another_form_is_applied() {
+    let (mut window, folder) = with_seen();
+    opened(&mut window);
+    let marks = ["Something is typed into its form", "Typed and not applied"];
+    let marked = |window: &Window| marks.map(|text| has(window, text));
+    assert_eq!(marked(&window), [false, false]);
+    type_into(&mut window, "width", "0,55");
+    assert_eq!(marked(&window), [true, false]);
+    window.ask(Action::Select(None));
+    window.frames(3);
+    assert_eq!(marked(&window), [true, true]);
+    window.click("Owner, inspection, air");
+    window.until_seen("Apply");
+    window.frames(20);
+    type_into(&mut window, "owner", "The county");
+    window.click("Apply");
+    let owner = |w: &mut World| w.resource::<CurrentScene>().0.structure.project.owner.clone();
+    window.until("the owner", |w| owner(w) == "The county");
+    window.frames(3);
+    assert_eq!(marked(&window), [true, true]);
+    window.ask(Action::Select(Some(0)));
+    window.frames(3);
+    assert_eq!(marked(&window), [true, false]);
+    assert_eq!(window.harness.get_by_label("width").value().as_deref(), Some("0,55"));
+    window.click("Apply");
+    window.until("the wider column", |w| is(w, 0.55));
+    window.ask(Action::Select(None));
+    window.frames(3);
+    assert_eq!(marked(&window), [false, false]);
+    let written = fs::read_to_string(folder.path().join("lonely.ron")).expect("the scene");
+    assert!(written.contains("owner: \"The county\"") && written.contains("width_m: 0.55"));
+}
+
+/// A height and a place along it are changed at once: the place is one of the new height. What a
+/// field is too narrow to say stands below it, once.
+#[test]
+fn a_place_is_one_on_the_member_as_high_as_it_becomes() {
+    let (mut window, folder) = with_seen();
+    opened(&mut window);
+    let note = "one more: place and length go together";
+    assert_eq!(window.harness.query_all_by_label(note).count(), 1);
+    type_into(&mut window, "begin at", "0,45");
+    type_into(&mut window, "height", "4.5");
+    window.click("Apply");
+    let height = |w: &mut World| {
+        let [low, high] = w.resource::<CurrentScene>().0.members[0].bounds;
+        high.y - low.y
+    };
+    window.until("the higher column", |w| (height(w) - 4.5).abs() < 1e-4);
+    let written = fs::read_to_string(folder.path().join("lonely.ron")).expect("the scene");
+    let expected = LONELY.replace("height_m: 3", "height_m: 4.5");
+    assert_eq!(written, expected.replace("diameter_mm: 20)", "diameter_mm: 20, from: 0.1)"));
+}
+
 /// What the file would be refused for is refused with its line; nothing is written, and what was
 /// typed stays, to be mended.
 #[test]
@@ -195,6 +252,9 @@ fn a_new_structure_is_seen_before_it_is_made() {
     window.click("New structure…");
     window.until_seen("Preview");
     window.until_seen("height");
+    window.click("Browse…");
+    window.frames(2);
+    assert!(has(&window, "type the folder's name instead"));
     let place = folder.path().join("pier");
     type_into(&mut window, "Folder to make", &place.display().to_string());
     type_into(&mut window, "title", "Pier 7");

@@ -724,6 +724,10 @@ fn a_prediction_goes_on_while_the_picture_is_paused_and_is_saved_as_by_predict()
     window.until("the prediction", |w| w.resource::<Latest>().result.is_some());
     assert_eq!(window.with(|w| *w.resource::<Pace>()), Pace::Rest, "the picture is paused");
     window.click("Report");
+    window.click("Browse…");
+    window.frames(2);
+    let asked = "type the folder's name instead";
+    assert!(window.harness.query_all_by_label_contains(asked).next().is_some());
     let out = folder.path().join("out");
     window.harness.get_by_label("Save to folder").focus();
     window.frame();

@@ -12,7 +12,7 @@ impl Form {
         let from = number(&tr!("along|place"), &self.from)?;
         let to = number(&tr!("along|place"), &self.to)?;
         let date = text(&self.date)
-            .map(|d| d.parse::<Date>().map_err(|why| tr!("date: {}", why)))
+            .map(|d| d.parse::<Date>().map_err(|why| tr!("date: {}", term(&why.to_string()))))
             .transpose()?;
         let what = self.what()?;
         let is_finding = matches!(what, What::Finding(_));

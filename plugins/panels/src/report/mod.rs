@@ -3,6 +3,8 @@
 
 mod save;
 
+use std::path::PathBuf;
+
 use bevy_ecs::prelude::*;
 use egui::{Grid, ScrollArea, Ui};
 use intrados_ct::score::Figure;
@@ -29,6 +31,16 @@ pub(crate) struct Report {
 impl Report {
     pub(crate) fn is_busy(&self) -> bool {
         self.save.is_busy()
+    }
+
+    /// Where its files would go.
+    pub(crate) fn proposal(&self) -> String {
+        self.save.proposal()
+    }
+
+    /// Where a dialog says.
+    pub(crate) fn put(&mut self, folder: PathBuf) {
+        self.save.put(folder);
     }
 }
 
@@ -58,7 +70,7 @@ pub(crate) fn report(
             ui.label(tr!("⚠ Outdated: the scene has changed since."));
         } else {
             let save = &mut report.bypass_change_detection().save;
-            save.row(ui, &scene.0, result, jobs.bypass_change_detection());
+            save.row(ui, &scene.0, result, jobs.bypass_change_detection(), &mut actions);
         }
         let wide = || ScrollArea::horizontal().auto_shrink([false, true]);
         wide().show(ui, |ui| table(ui, result, *selection, &latest, &mut actions));

@@ -3,7 +3,7 @@
 use std::{path::PathBuf, sync::Arc};
 
 use bevy_ecs::prelude::*;
-use egui::{Button, TextEdit, Ui};
+use egui::{Button, Ui};
 use intrados_light::LitScene;
 use intrados_predict::Prediction;
 use intrados_report::{Record, RecordError};
@@ -11,13 +11,13 @@ use intrados_scene::Scene;
 use intrados_stage::{Cancelled, Job, Jobs, Task, aside};
 
 use super::Report;
-use crate::{Banners, Log, lang::term, saving::Written};
+use crate::{Action, Actions, Banners, Log, destination::Destination, lang::term, saving::Written};
 
 /// Where to, and the write that runs.
 #[derive(Default)]
 pub(super) struct Save {
-    folder: String,
-    /// The scene that `folder` was proposed for.
+    to: Destination,
+    /// The scene that it was proposed for.
     of: String,
     task: Option<Task<(PathBuf, Result<usize, RecordError>)>>,
 }
@@ -27,6 +27,16 @@ impl Save {
         self.task.is_some()
     }
 
+    /// Where it would go.
+    pub(super) fn proposal(&self) -> String {
+        self.to.path.clone()
+    }
+
+    /// Where a dialog says.
+    pub(super) fn put(&mut self, folder: PathBuf) {
+        self.to.put_folder(folder);
+    }
+
     /// Asks for the folder.
     pub(super) fn row(
         &mut self,
@@ -34,23 +44,25 @@ impl Save {
         scene: &Arc<Scene>,
         prediction: &Arc<Prediction>,
         jobs: &mut Jobs,
+        actions: &mut Actions,
     ) {
         if self.of != scene.name {
             self.of = scene.name.clone();
-            self.folder = format!("{}-damage", scene.name.replace(['/', '\\'], "-"));
+            self.to.path = format!("{}-damage", scene.name.replace(['/', '\\'], "-"));
         }
-        ui.horizontal(|ui| {
-            let label = ui.label(tr!("Save to folder"));
-            let field = TextEdit::singleline(&mut self.folder).desired_width(240.0);
-            ui.add(field).labelled_by(label.id);
-            let folder = self.folder.trim();
+        ui.horizontal_wrapped(|ui| {
+            let is_entered = self.to.field(ui, tr!("Save to folder"), 240.0);
+            if ui.button(tr!("Browse…")).clicked() {
+                actions.ask(Action::ChooseReportFolder);
+            }
+            let folder = self.to.path.trim();
             let may = self.task.is_none() && !folder.is_empty();
             let hint = tr!(
                 "Report, tables and models, as `intrados predict --out` writes them: report.html, \
                  predict.json, CSV, glTF and VTU"
             );
             let save = ui.add_enabled(may, Button::new(tr!("Save report")));
-            if save.on_hover_text(hint).clicked() {
+            if save.on_hover_text(hint).clicked() || is_entered && may {
                 let (scene, prediction) = (Arc::clone(scene), Arc::clone(prediction));
                 self.task = Some(begin(folder.into(), scene, prediction, jobs));
             }

@@ -1,7 +1,7 @@
 //! The form of what a scene's file says of a member, or of the whole structure: its values are
 //! changed here and written there.
 
-use std::{path::PathBuf, sync::Arc};
+use std::{collections::BTreeMap, path::PathBuf, sync::Arc};
 
 use bevy_ecs::prelude::*;
 use egui::{Button, Ui};
@@ -15,20 +15,25 @@ use crate::{
     values::{Typed, Values},
 };
 
-/// What has been typed; of another member or another scene it is begun anew.
+/// So many other forms are named that something is typed in.
+const NAMED: usize = 4;
+
+/// What has been typed of a scene, form by form. It stays until it is applied or discarded, or until
+/// another scene is opened.
 #[derive(Resource, Default)]
 pub(crate) struct Properties {
-    /// The scene's file, and the member's id.
-    of: (PathBuf, Option<String>),
+    /// The scene's file.
+    scene: PathBuf,
     /// The scene's hash, another one where its evidence or its file has changed.
     hash: String,
+    /// The form that is shown, and what it is of: a member's id; none: the whole structure.
     values: Values,
-    /// What another session has left, and the file of the scene that it is of; it waits until its
-    /// form is drawn.
-    left: Option<(PathBuf, Unapplied)>,
+    of: Option<String>,
+    /// What has been typed into the others.
+    others: BTreeMap<Option<String>, Vec<Typed>>,
 }
 
-/// What has been typed into the form and is not applied.
+/// What has been typed into a form and is not applied.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Unapplied {
     /// The member's id; none: it is of the whole structure.
@@ -37,21 +42,49 @@ pub(crate) struct Unapplied {
 }
 
 impl Properties {
-    /// What has been typed of this scene and is not applied, if anything is.
-    pub(crate) fn unapplied(&self, scene: &Scene) -> Option<Unapplied> {
-        let left = self.left.as_ref().filter(|(of, _)| *of == scene.path);
-        if let Some((_, left)) = left {
-            return Some(left.clone());
+    /// What has been typed of this scene and is not applied.
+    pub(crate) fn unapplied(&self, scene: &Scene) -> Vec<Unapplied> {
+        if self.scene != scene.path {
+            return Vec::new();
         }
-        let (of, member) = &self.of;
         let typed = self.values.typed();
-        let is_typed = *of == scene.path && !typed.is_empty();
-        is_typed.then(|| Unapplied { member: member.clone(), typed })
+        let shown = (!typed.is_empty()).then_some((&self.of, &typed));
+        let all = self.others.iter().chain(shown);
+        all.map(|(of, typed)| Unapplied { member: of.clone(), typed: typed.clone() }).collect()
+    }
+
+    /// Whether something has been typed of a member of this scene and is not applied.
+    pub(crate) fn is_typed(&self, scene: &Scene, member: &str) -> bool {
+        let is = |of: &Option<String>| of.as_deref() == Some(member);
+        let is_shown = is(&self.of) && self.values.changed() > 0;
+        self.scene == scene.path && (is_shown || self.others.keys().any(is))
     }
 
     /// Goes on with what another session has left of this scene.
-    pub(crate) fn go_on(&mut self, scene: &Scene, left: Unapplied) {
-        *self = Self { left: Some((scene.path.clone(), left)), ..Self::default() };
+    pub(crate) fn go_on(&mut self, scene: &Scene, left: Vec<Unapplied>) {
+        let others = left.into_iter().map(|left| (left.member, left.typed)).collect();
+        *self = Self { scene: scene.path.clone(), others, ..Self::default() };
+    }
+
+    /// Goes to the form of a member or of the structure, as the file is now.
+    fn turn_to(&mut self, scene: &Scene, member: Option<&Member>) {
+        if self.scene != scene.path {
+            *self = Self { scene: scene.path.clone(), ..Self::default() };
+        }
+        let of = member.map(|m| m.id.clone());
+        if self.of == of && self.hash == scene.hash {
+            return;
+        }
+        let typed = self.values.typed();
+        if !typed.is_empty() {
+            self.others.insert(self.of.take(), typed);
+        }
+        if self.hash != scene.hash {
+            self.others = still_typed(std::mem::take(&mut self.others), scene);
+        }
+        let typed = self.others.remove(&of).unwrap_or_default();
+        self.values = Values::again(fields(scene, member), &typed);
+        (self.of, self.hash) = (of, scene.hash.clone());
     }
 
     /// Draws it.
@@ -62,17 +95,8 @@ impl Properties {
         member: Option<&Member>,
         actions: &mut Actions,
     ) {
-        let of = (scene.path.clone(), member.map(|m| m.id.clone()));
-        if self.of != of {
-            self.values = Values::new(fields(scene, member));
-        } else if self.hash != scene.hash {
-            self.values.renew(fields(scene, member));
-        }
-        (self.of, self.hash) = (of, scene.hash.clone());
-        let left = self.left.take_if(|(of, left)| (&*of, &left.member) == (&self.of.0, &self.of.1));
-        if let Some((_, left)) = left {
-            self.values.type_again(&left.typed);
-        }
+        self.turn_to(scene, member);
+        self.elsewhere(ui, scene, actions);
         if self.values.is_empty() {
             return;
         }
@@ -87,6 +111,27 @@ impl Properties {
                      “New structure…” makes one that is yours."));
             }
             ui.add_enabled_ui(scene.path.exists(), |ui| self.values.show(ui));
+        });
+    }
+
+    /// Which other forms wait to be applied, and the way there.
+    fn elsewhere(&self, ui: &mut Ui, scene: &Scene, actions: &mut Actions) {
+        if self.others.is_empty() {
+            return;
+        }
+        ui.horizontal_wrapped(|ui| {
+            ui.label(tr!("✏ Typed and not applied:"));
+            for of in self.others.keys().take(NAMED) {
+                let name = of.as_deref().map_or(scene.name.as_str(), |id| scene.name_of(id));
+                if ui.link(name).clicked() {
+                    let place = |id: &String| scene.members.iter().position(|m| m.id == *id);
+                    actions.ask(Action::Select(of.as_ref().and_then(place)));
+                }
+            }
+            let more = self.others.len().saturating_sub(NAMED);
+            if more > 0 {
+                ui.label(tr!("and {} more", more));
+            }
         });
     }
 
@@ -120,4 +165,20 @@ impl Properties {
             }
         });
     }
+}
+
+/// What is typed still, as the file is now.
+fn still_typed(
+    typed: BTreeMap<Option<String>, Vec<Typed>>,
+    scene: &Scene,
+) -> BTreeMap<Option<String>, Vec<Typed>> {
+    let again = |(of, typed): (Option<String>, Vec<Typed>)| {
+        let member = match &of {
+            Some(id) => Some(scene.members.iter().find(|m| m.id == *id)?),
+            None => None,
+        };
+        let typed = Values::again(fields(scene, member), &typed).typed();
+        (!typed.is_empty()).then_some((of, typed))
+    };
+    typed.into_iter().filter_map(again).collect()
 }

@@ -822,14 +822,11 @@ impl View<'_> {
             let (image, background) = (shown.drawn.image.clone(), ui.visuals().extreme_bg_color);
             let legend = self.legend(stress.quantity, shown).drawn(ui, image.width());
             let (skin, shot) = (Arc::clone(self.skin), Arc::clone(self.shot));
-            stress.task = Some(Task::spawn(
-                jobs,
-                format!("writing {}", path.display()),
-                move |_| match kind {
+            stress.task =
+                Some(Task::spawn(jobs, tr!("writing {}", path.display()), move |_| match kind {
                     save::Kind::Picture => save::picture(image, background, &legend, &path, &what),
                     save::Kind::Table => save::table(&skin, &shot, &path, &what),
-                },
-            ));
+                }));
         }
         if kind.is_none() {
             ui.weak(tr!("The name must end in .png or .csv."));

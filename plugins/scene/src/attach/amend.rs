@@ -166,7 +166,7 @@ mod tests {
     use intrados_stage::Access;
 
     use super::*;
-    use crate::attach::fields;
+    use crate::attach::{Field, fields};
 
     const SCENE: &str = r#"// Mine.
 (
@@ -322,6 +322,36 @@ mod tests {
         let gone = [("Bars around", "length of lap 1", ""), ("Bars around", "length of lap 2", "")];
         amend(&path, &load(&path), Some("C1"), &gone).unwrap();
         assert_eq!(said(&path), format!("{once}]"));
+    }
+
+    #[test]
+    fn places_are_shares_of_the_axis_as_it_becomes() {
+        let (_folder, path) = written();
+        let bars = [
+            ("Bars", "cover", "35"),
+            ("Bars", "bars around the section", "8"),
+            ("Bars", "their diameter", "16"),
+        ];
+        amend(&path, &load(&path), Some("C1"), &bars).unwrap();
+        let scene = load(&path);
+        let all = fields(&scene, scene.members.first());
+        let values = [
+            ("begin at", "0.45"),
+            ("middle of lap 1", "2,25"),
+            ("length of lap 1", "900"),
+            ("height", "4,5"),
+        ];
+        let field = |name: &str| all.iter().find(|f| f.name == name).unwrap();
+        let changes = values.map(|(name, text)| (field(name), text));
+        let settings = Field::set_all(&changes).unwrap();
+        let (access, job) = (Access::default(), Job::default());
+        Project::edit(&path, &access, &job).unwrap().amend(&scene, &settings, &job).unwrap();
+        let text = fs::read_to_string(&path).unwrap();
+        assert!(text.contains("height_m: 4.5"), "{text}");
+        assert!(text.contains("from: 0.1, laps: [(at: 0.5, length_mm: 900)]"), "{text}");
+        // A height that is none is refused by itself.
+        let why = Field::set_all(&[(field("begin at"), "1"), (field("height"), "high")]);
+        assert_eq!(why.unwrap_err(), "height: “high” is no number");
     }
 
     #[test]

@@ -34,6 +34,8 @@ pub struct Field {
     before: Vec<Setting>,
     /// What a number is divided by before it is written: a length along an axis is a share there.
     per: f32,
+    /// Where the length of that axis is written, if a form can change it.
+    axis: Option<Vec<Step>>,
     /// Whether the whole entry that it is of is taken out where it is left empty.
     of_entry: bool,
 }
@@ -61,8 +63,31 @@ impl Field {
     /// # Errors
     /// It is none of its kind: what to write instead, in a few words.
     pub fn set(&self, text: &str) -> Result<Vec<Setting>, String> {
+        self.set_by(text, f64::from(self.per))
+    }
+
+    /// What is to be written so that fields have these values all at once: a place on an axis whose
+    /// length changes, too, is a share of the new one.
+    ///
+    /// # Errors
+    /// As [`Field::set`].
+    pub fn set_all(changes: &[(&Self, &str)]) -> Result<Vec<Setting>, String> {
+        let per = |field: &Self| {
+            let axis = field.axis.as_ref()?;
+            let (_, length) = changes.iter().find(|(other, _)| other.path == *axis)?;
+            number(length).filter(|length| *length > 0.0)
+        };
+        let mut settings = Vec::new();
+        for &(field, text) in changes {
+            let per = per(field).unwrap_or(f64::from(field.per));
+            settings.extend(field.set_by(text, per)?);
+        }
+        Ok(settings)
+    }
+
+    fn set_by(&self, text: &str, per: f64) -> Result<Vec<Setting>, String> {
         let text = text.trim();
-        let value = if text.is_empty() { None } else { Some(self.ron(text)?) };
+        let value = if text.is_empty() { None } else { Some(self.ron(text, per)?) };
         if value.is_none() && matches!(self.path.last(), Some(Entry(_))) {
             return Err(format!("{}: fill it in, 0 for none", self.name));
         }
@@ -80,13 +105,11 @@ impl Field {
         &self.path
     }
 
-    fn ron(&self, text: &str) -> Result<String, String> {
+    fn ron(&self, text: &str, per: f64) -> Result<String, String> {
         let name = &self.name;
         match self.kind {
             FieldKind::Number => {
-                let point = text.replace(',', ".");
-                let number: Option<f64> = point.parse().ok();
-                let number = number.map(|n| (n / f64::from(self.per)) as f32);
+                let number = number(text).map(|n| (n / per) as f32);
                 let number = number.filter(|n| n.is_finite());
                 let number = number.ok_or_else(|| format!("{name}: “{text}” is no number"))?;
                 Ok(number.to_string())
@@ -107,6 +130,11 @@ impl Field {
             }
         }
     }
+}
+
+/// A number as somebody types it, with a point or a comma.
+fn number(text: &str) -> Option<f64> {
+    text.trim().replace(',', ".").parse().ok()
 }
 
 fn quoted(text: &str) -> Result<String, String> {
@@ -146,6 +174,12 @@ pub(super) fn said(scene: &Scene) -> Option<SceneFile> {
     file::parse(&scene.name, &scene.written.0).ok()
 }
 
+/// How long a member's axis is, m, and where that is written, if a form can change it.
+struct Axis {
+    length_m: f32,
+    written: Option<Vec<Step>>,
+}
+
 /// What is being listed.
 struct List<'a> {
     file: &'a SceneFile,
@@ -183,6 +217,7 @@ impl List<'_> {
             path: at,
             before: vec![],
             per: 1.0,
+            axis: None,
             of_entry: false,
         });
     }
@@ -203,12 +238,12 @@ impl List<'_> {
         }
     }
 
-    /// A place on an axis of this length, m, which the file has as a share of it.
-    fn place(&mut self, name: &str, share: Option<f32>, length_m: f32, at: Vec<Step>) {
-        let millimetres = |share: f32| (1000.0 * share * length_m).round() / 1000.0;
+    /// A place on an axis, which the file has as a share of it.
+    fn place(&mut self, name: &str, share: Option<f32>, axis: &Axis, at: Vec<Step>) {
+        let millimetres = |share: f32| (1000.0 * share * axis.length_m).round() / 1000.0;
         self.number(name, "m", share.map(millimetres), at);
         if let Some(field) = self.fields.last_mut() {
-            field.per = length_m;
+            (field.per, field.axis) = (axis.length_m, axis.written.clone());
         }
     }
 
@@ -298,7 +333,8 @@ impl List<'_> {
         if let Some(bars) = detail.and_then(|d| d.reinforcement.as_ref()) {
             let from = self.fields.len();
             let path = [list.clone(), Entry(index), Named("reinforcement")];
-            self.reinforcement(Some(bars), member.frame.axis.length(), &path);
+            let axis = Axis { length_m: member.frame.axis.length(), written: None };
+            self.reinforcement(Some(bars), &axis, &path);
             let states = before(index, &[Assumed::Reinforcement]);
             let own = self.fields.iter_mut().skip(from);
             own.for_each(|f| f.before = [&states[..], &f.before[..]].concat());
@@ -366,15 +402,15 @@ impl List<'_> {
         match body {
             Body::Column { section, height_m, reinforcement } => {
                 self.section(path, section);
-                self.number("height", "m", Some(*height_m), place(&[Named("height_m")]));
+                let axis = self.axis("height", *height_m, place(&[Named("height_m")]));
                 let at = place(&[Named("reinforcement")]);
-                self.reinforcement(reinforcement.as_ref(), *height_m, &at);
+                self.reinforcement(reinforcement.as_ref(), &axis, &at);
             }
             Body::Beam { section, length_m, reinforcement, .. } => {
                 self.section(path, section);
-                self.number("length", "m", Some(*length_m), place(&[Named("length_m")]));
+                let axis = self.axis("length", *length_m, place(&[Named("length_m")]));
                 let at = place(&[Named("reinforcement")]);
-                self.reinforcement(reinforcement.as_ref(), *length_m, &at);
+                self.reinforcement(reinforcement.as_ref(), &axis, &at);
             }
             Body::BoxGirder { section: s, length_m, reinforcement, .. } => {
                 for (name, value, field) in [
@@ -388,9 +424,9 @@ impl List<'_> {
                     let at = place(&[Named("section"), Named(field)]);
                     self.number(name, "m", Some(value), at);
                 }
-                self.number("length", "m", Some(*length_m), place(&[Named("length_m")]));
+                let axis = self.axis("length", *length_m, place(&[Named("length_m")]));
                 let at = place(&[Named("reinforcement")]);
-                self.reinforcement(reinforcement.as_ref(), *length_m, &at);
+                self.reinforcement(reinforcement.as_ref(), &axis, &at);
             }
             Body::Tunnel { radius_m, length_m, segments, inner_lining, ground, .. } => {
                 self.group("Size of the tunnel");
@@ -419,6 +455,12 @@ impl List<'_> {
         }
     }
 
+    /// The length of a member's axis, m.
+    fn axis(&mut self, name: &str, length_m: f32, at: Vec<Step>) -> Axis {
+        self.number(name, "m", Some(length_m), at.clone());
+        Axis { length_m, written: Some(at) }
+    }
+
     fn section(&mut self, path: &[Step], section: &Section) {
         let place = |field| at(path, &[Named("section"), Named(field)]);
         match section {
@@ -432,8 +474,7 @@ impl List<'_> {
         }
     }
 
-    /// `length_m`: of the member's axis.
-    fn reinforcement(&mut self, said: Option<&Reinforcement>, length_m: f32, path: &[Step]) {
+    fn reinforcement(&mut self, said: Option<&Reinforcement>, axis: &Axis, path: &[Step]) {
         self.group("Bars");
         let place = |steps: &[Step]| at(path, steps);
         self.number("cover", "mm", said.map(|r| r.cover_mm), place(&[Named("cover_mm")]));
@@ -464,21 +505,21 @@ impl List<'_> {
             let is_one = said.bars.len() == 1;
             let layer = if is_one { String::new() } else { format!(", layer {}", number + 1) };
             self.group(what + &layer);
-            self.bars(bars, length_m, &place(&[Named("bars"), Entry(number)]));
+            self.bars(bars, axis, &place(&[Named("bars"), Entry(number)]));
         }
     }
 
     /// A set of bars, from place to place along its member.
-    fn bars(&mut self, bars: &Bars, length_m: f32, path: &[Step]) {
+    fn bars(&mut self, bars: &Bars, axis: &Axis, path: &[Step]) {
         const ENDS: &[&str] = &["Anchored", "Hooked", "Straight"];
         let place = |field| at(path, &[Named(field)]);
         let (count, diameter) = bars.size();
         self.count("number of bars", Some(count), place("count"));
         self.number("diameter of a bar", "mm", Some(diameter), place("diameter_mm"));
         let [from, to] = bars.span();
-        self.place("begin at", Some(from), length_m, place("from"));
+        self.place("begin at", Some(from), axis, place("from"));
         self.note("along the axis; left out: at its start");
-        self.place("end at", Some(to), length_m, place("to"));
+        self.place("end at", Some(to), axis, place("to"));
         self.note("along the axis; left out: at its end");
         let ends = bars.ends();
         // Both stand in one pair of brackets.
@@ -491,11 +532,11 @@ impl List<'_> {
             self.note("counts where bars slip");
             self.before(if unsaid { vec![before.clone()] } else { Vec::new() });
         }
-        self.laps(bars.laps(), length_m, path);
+        self.laps(bars.laps(), axis, path);
     }
 
     /// Laps, and room for one more.
-    fn laps(&mut self, laps: &[Lap], length_m: f32, path: &[Step]) {
+    fn laps(&mut self, laps: &[Lap], axis: &Axis, path: &[Step]) {
         for (k, lap) in laps.iter().map(Some).chain([None]).enumerate() {
             let place = |field| at(path, &[Named("laps"), Entry(k), Named(field)]);
             let note = match lap {
@@ -504,7 +545,7 @@ impl List<'_> {
             };
             let from = self.fields.len();
             let name = format!("middle of lap {}", k + 1);
-            self.place(&name, lap.map(|lap| lap.at), length_m, place("at"));
+            self.place(&name, lap.map(|lap| lap.at), axis, place("at"));
             let name = format!("length of lap {}", k + 1);
             self.number(&name, "mm", lap.map(|lap| lap.length_mm), place("length_mm"));
             for field in self.fields.iter_mut().skip(from) {

@@ -217,14 +217,15 @@ fn syntax_problem(name: &str, text: &str, error: &SpannedError, page: &str) -> P
     let (line, column) = (error.span.start.line, error.span.start.col);
     let decimal = decimal_comma(text, line, column);
     let curly = curly_quote(text, line, column);
+    let meant = |word: &str| format!("did you mean `{word}`?");
     let remedy = match &error.code {
         _ if curly.is_some() => curly.unwrap_or_default(),
         _ if decimal.is_some() => decimal.unwrap_or_default(),
-        E::NoSuchStructField { expected, found, .. }
-        | E::NoSuchEnumVariant { expected, found, .. } => match nearest(found, expected) {
-            Some(word) => format!("did you mean `{word}`?"),
-            None => format!("take it out; {page} lists every field"),
-        },
+        E::NoSuchStructField { expected, found, .. } => nearest(found, expected)
+            .map_or_else(|| format!("take it out; {page} lists every field"), meant),
+        // Which there are, `what` says.
+        E::NoSuchEnumVariant { expected, found, .. } => nearest(found, expected)
+            .map_or_else(|| format!("{page} shows each of them with its fields"), meant),
         E::MissingStructField { field, .. } => format!("add `{field}: …`"),
         E::DuplicateStructField { .. } => "keep one of them".into(),
         E::ExpectedComma => "put a comma between the fields, or close the bracket".into(),
