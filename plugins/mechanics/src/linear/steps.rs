@@ -459,11 +459,13 @@ impl Reader {
             return Ok(((node, component), self.units.length()));
         };
         let label = self.deck.labels[node as usize];
-        if self.deck.turned.contains_key(&node) {
-            return Err(row.fault(format!("angles of node {label}, which a *TRANSFORM turns")));
-        }
         let known = self.turning.get(&node).copied();
-        let turning = self.angles(node, supported, row).or(known);
+        let mean = self.angles(node, supported, row);
+        if let (None, Some(known), Some(&axes)) = (mean, known, self.deck.turned.get(&node)) {
+            // Angles of a body are a vector, which a *TRANSFORM turns like any other.
+            self.deck.turned.insert(known, axes);
+        }
+        let turning = mean.or(known);
         let none = || {
             row.fault(format!(
                 "node {label} has no component {}: solids have 1 to 3",
@@ -817,7 +819,7 @@ impl Reader {
         let loose = loose.map_err(|(node, off)| {
             let label = self.deck.labels.get(node as usize).copied().unwrap_or_default();
             card.fault(format!(
-                "node {label} is {:.3e} off {master}: a tie across a gap is not computed, let the surfaces meet",
+                "node {label} is {:.3e} off {master}: a tie across a gap would hold what turns, let the surfaces meet, or leave out ADJUST=NO",
                 off / self.units.length()
             ))
         })?;

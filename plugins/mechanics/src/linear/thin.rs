@@ -386,7 +386,9 @@ impl Reader {
             return Some(turning);
         }
         let turning = self.hidden_node(node);
-        for (i, axis) in (0..).zip(DVec3::AXES) {
+        // About the node's own axes: mean angles are not a vector.
+        let own = self.deck.turned.get(&node).map(|frame| frame.map(DVec3::from_array));
+        for (i, axis) in (0..).zip(own.unwrap_or(DVec3::AXES)) {
             let (nodes, angle) = (ring.outer.clone(), 3 * turning + i);
             // Two nodes along an axis say nothing of a turn about it.
             self.bound(Curve::Turn { nodes, axis, angle, unit: 1.0 }, row.line);
