@@ -30,7 +30,7 @@ NODES, POINTS = "*NODE PRINT,NSET=ZZALL,GLOBAL=YES,FREQUENCY=100000", "*EL PRINT
 EXACT = "*CONTROLS,PARAMETERS=FIELD\n1.E-7,1.E-7,,,1.E-7,1.E-7,1.E-7"
 # What a step without these is asked for would be printed for every mode.
 NOTHING = ["*NODE PRINT,FREQUENCY=0", "*EL PRINT,FREQUENCY=0"]
-PROCEDURES = ("STATIC", "DYNAMIC", "FREQUENCY", "BUCKLE", "HEATTRANSFER", "MODALDYNAMIC", "STEADYSTATEDYNAMICS")
+PROCEDURES = ("STATIC", "DYNAMIC", "FREQUENCY", "BUCKLE", "HEATTRANSFER", "COUPLEDTEMPERATURE-DISPLACEMENT", "UNCOUPLEDTEMPERATURE-DISPLACEMENT", "MODALDYNAMIC", "STEADYSTATEDYNAMICS")
 KINDS = ("displacements", "stresses", "temperatures", "eigenvalues")
 
 
@@ -56,7 +56,8 @@ def asked(procedure, elements):
         return NOTHING
     if name == "HEATTRANSFER":
         return [NODES, "NT"]
-    cards = [NODES, "U", POINTS, "S"] if elements else [NODES, "U"]
+    of_nodes = "U,NT" if name.endswith("TEMPERATURE-DISPLACEMENT") else "U"
+    cards = [NODES, of_nodes, POINTS, "S"] if elements else [NODES, of_nodes]
     return [card.replace("=100000", "=1") for card in cards] if name == "STEADYSTATEDYNAMICS" else cards
 
 

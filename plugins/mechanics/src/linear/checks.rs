@@ -183,6 +183,24 @@ fn a_bar_swings_in_time() {
     near(solve(&thrown)[0].displacements[0].x, 0.5 - 0.25 * (1.0 - (-2.0f64).exp()), 1e-5);
 }
 
+/// Warmed through at one end, free to grow: all of it grows alike, without stress.
+#[test]
+fn blocks_grow_as_warm_as_they_settle() {
+    let deck = cube(
+        "*STEP\n*COUPLED TEMPERATURE-DISPLACEMENT,STEADY STATE\n*BOUNDARY\nLOW,11,11,100.\n*END STEP\n",
+    );
+    let solved = solve(&deck);
+    near(*solved[0].temperatures.last().unwrap(), 100.0, 1e-9);
+    near(solved[1].displacements.last().unwrap().x, 0.1, 1e-9);
+    solved[1].stresses.iter().flatten().flatten().for_each(|s| near(*s, 0.0, 1e-7));
+    let why = parse(
+        deck.replace("*STEP", "*STEP,NLGEOM").as_bytes(),
+        Path::new("deck.inp"),
+        Units::MetreNewton,
+    );
+    assert!(why.unwrap_err().to_string().contains("without NLGEOM"));
+}
+
 /// A pair of blocks that an equation binds goes on alone once the equation is removed.
 #[test]
 fn equations_hold_until_they_are_removed() {

@@ -64,6 +64,8 @@ struct Open {
     procedure: Option<Procedure>,
     damping: Damping,
     diameters: Option<[u32; 2]>,
+    /// Whether displacements follow the temperatures.
+    coupled: bool,
 }
 
 impl State {
@@ -120,8 +122,9 @@ impl Reader {
     pub(super) fn history(&mut self, card: &Card<'_>, state: &mut State) -> Result<(), Fault> {
         let name = plain(card);
         const WITHIN: &str = "STATIC DYNAMIC FREQUENCY BUCKLE HEATTRANSFER MODALDYNAMIC \
-            STEADYSTATEDYNAMICS MODALDAMPING SELECTCYCLICSYMMETRYMODES ENDSTEP CLOAD DLOAD DSLOAD TEMPERATURE CFLUX DFLUX \
-            FILM RADIATE CHANGESOLIDSECTION";
+            COUPLEDTEMPERATURE-DISPLACEMENT UNCOUPLEDTEMPERATURE-DISPLACEMENT STEADYSTATEDYNAMICS \
+            MODALDAMPING SELECTCYCLICSYMMETRYMODES ENDSTEP CLOAD DLOAD DSLOAD TEMPERATURE CFLUX \
+            DFLUX FILM RADIATE CHANGESOLIDSECTION";
         if WITHIN.split_ascii_whitespace().any(|w| w == name) && state.open.is_none() {
             return Err(card.fault(format!("*{} must stand in a *STEP", card.name)));
         }
@@ -132,6 +135,8 @@ impl Reader {
             | "FREQUENCY"
             | "BUCKLE"
             | "HEATTRANSFER"
+            | "COUPLEDTEMPERATURE-DISPLACEMENT"
+            | "UNCOUPLEDTEMPERATURE-DISPLACEMENT"
             | "MODALDYNAMIC"
             | "STEADYSTATEDYNAMICS" => procedure(card, &name, state),
             "MODALDAMPING" => damping(card, state),
@@ -150,11 +155,20 @@ impl Reader {
         }
     }
 
-    /// What is in force at the end of the step.
     fn close(&mut self, state: &mut State) -> Result<(), Fault> {
         let Some(open) = state.open.take() else { return Ok(()) };
-        let Open { line, duration, damping, diameters, .. } = open;
-        let procedure = open.procedure.unwrap_or_default();
+        self.end(open.procedure.unwrap_or_default(), &open, state)?;
+        if open.coupled {
+            // What the temperatures of the step that has just been added do.
+            self.end(Procedure::Static, &open, state)?;
+        }
+        state.time += open.duration;
+        Ok(())
+    }
+
+    /// What is in force at the end of the step.
+    fn end(&mut self, procedure: Procedure, open: &Open, state: &State) -> Result<(), Fault> {
+        let &Open { line, duration, diameters, .. } = open;
         self.suits(procedure, state, line)?;
         let in_time = matches!(procedure, Procedure::Heat { steady: false, .. });
         let factor = |amplitude: &Option<String>| -> Result<f64, Fault> {
@@ -176,7 +190,7 @@ impl Reader {
         } else {
             state.loads(factor)?
         };
-        (step.procedure, step.damping) = (procedure, damping);
+        (step.procedure, step.damping) = (procedure, open.damping.clone());
         step.diameters = diameters;
         if diameters.is_some() && !matches!(procedure, Procedure::Modes { heat: false, .. }) {
             let why = "*SELECT CYCLIC SYMMETRY MODES stands in a step of *FREQUENCY";
@@ -200,7 +214,6 @@ impl Reader {
                 step.warm[node as usize] = warm.value * factor(&warm.amplitude)?;
             }
         }
-        state.time += duration;
         self.deck.steps.push(step);
         Ok(())
     }
@@ -857,6 +870,7 @@ fn begin(card: &Card<'_>, state: &mut State) -> Result<(), Fault> {
         procedure: None,
         damping: Damping::None,
         diameters: None,
+        coupled: false,
     });
     if let Some(word) = card.word("NLGEOM") {
         state.large = word != "NO";
@@ -908,6 +922,16 @@ fn procedure(card: &Card<'_>, name: &str, state: &mut State) -> Result<(), Fault
             card.only(&["SOLVER", "HARMONIC"])?;
             open.duration = 0.0;
             vibration(card, &numbers)?
+        }
+        "COUPLEDTEMPERATURE-DISPLACEMENT" | "UNCOUPLEDTEMPERATURE-DISPLACEMENT" => {
+            card.only(&["STEADY STATE", "SOLVER", "DIRECT", "DELTMX"])?;
+            if !has("STEADY STATE") || state.large || !state.warm.is_empty() {
+                let what = "is computed with STEADY STATE, and without NLGEOM and *TEMPERATURE";
+                return Err(card.fault(format!("*{} {what}", card.name)));
+            }
+            open.duration = duration(card, &numbers)?;
+            open.coupled = true;
+            Procedure::Heat { steady: true, first: open.duration, duration: open.duration }
         }
         _ => {
             const ALLOWED: [&str; 7] = [
