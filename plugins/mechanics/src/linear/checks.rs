@@ -145,6 +145,19 @@ fn springs_follow_their_table_and_turn() {
     near(solve(deck)[0].displacements[1].x, 1.0 + 19.0 / 90.0, 1e-9);
 }
 
+/// A bolt between two springs of 10 N/m, pulled together by 5 N.
+#[test]
+fn bolts_pull_their_ends_together() {
+    let deck = "*NODE\n1,0,0,0\n2,1,0,0\n3,-1,0,0\n4,2,0,0\n9,0,0,0\n*ELEMENT,TYPE=SPRINGA,ELSET=S\n\
+                1,3,1\n2,2,4\n*SPRING,ELSET=S\n10.\n*ELEMENT,TYPE=B31\n3,1,2\n\
+                *PRE-TENSION SECTION,ELEMENT=3,NODE=9\n1.,0.,0.\n\
+                *BOUNDARY\n3,1,3\n4,1,3\n1,2,3\n2,2,3\n*STEP\n*STATIC\n*CLOAD\n9,1,5.\n*END STEP\n";
+    let moved = &solve(deck)[0].displacements;
+    near(moved[0].x, 0.5, 1e-12);
+    near(moved[1].x, -0.5, 1e-12);
+    near(moved[4].x, 1.0, 1e-12);
+}
+
 /// A block on a soft spring whose support follows a ramp moves with the ramp, and its modes by what
 /// the ramp's corner left: u = v (t − sin(ωt)/ω).
 #[test]

@@ -30,6 +30,8 @@ pub(super) enum Link {
     Components,
     /// DASHPOTA: along the line between two nodes.
     Damper,
+    /// A B31 that a `*PRE-TENSION SECTION` stands for.
+    Bolt,
     /// DCOUP3D: the node of a `*DISTRIBUTING COUPLING`.
     Coupling,
 }
@@ -48,7 +50,7 @@ impl Link {
 
     pub(super) fn nodes(self) -> usize {
         match self {
-            Self::Between | Self::Damper | Self::Components => 2,
+            Self::Between | Self::Damper | Self::Components | Self::Bolt => 2,
             Self::Ground | Self::Coupling => 1,
         }
     }
@@ -284,10 +286,18 @@ impl Reader {
         if plain(card) != "PRE-TENSIONSECTION" {
             return Ok(());
         }
-        card.only(&["SURFACE", "NODE"])?;
-        let name = card.need("SURFACE")?;
+        card.only(&["SURFACE", "ELEMENT", "NODE"])?;
         let row = Row { line: card.line, text: "" };
         let pilot = self.node(&card.need("NODE")?, row)?;
+        let axis = match all_numbers(card)?.as_slice() {
+            &[x, y, z] => DVec3::new(x, y, z).try_normalize(),
+            _ => None,
+        };
+        let axis = axis.ok_or_else(|| card.fault("needed are: x, y, z of the normal"))?;
+        if let Some(element) = name_of(card, "ELEMENT")? {
+            return self.bolt(&element, pilot, axis, row);
+        }
+        let name = card.need("SURFACE")?;
         let Some(Surface::Faces(faces)) = self.surfaces.get(&name) else {
             return Err(card.fault(format!("surface {} of faces is not defined", quote(&name))));
         };
@@ -297,11 +307,6 @@ impl Reader {
             own.insert(element);
             nodes.extend(self.raw[element as usize].side(face));
         }
-        let axis = match all_numbers(card)?.as_slice() {
-            &[x, y, z] => DVec3::new(x, y, z).try_normalize(),
-            _ => None,
-        };
-        let axis = axis.ok_or_else(|| card.fault("needed are: x, y, z of the normal"))?;
         let middle = |nodes: &[u32]| {
             nodes.iter().map(|&n| self.deck.nodes[n as usize]).sum::<DVec3>() / nodes.len() as f64
         };
@@ -329,6 +334,23 @@ impl Reader {
                 self.deck.equations.push(Equation { terms, value: 0.0, line: card.line });
             }
         }
+        Ok(())
+    }
+
+    /// The beam that a bolt is leaves its place to its pull: its nodes come nearer along the axis by
+    /// the first component of another.
+    fn bolt(&mut self, element: &str, pilot: u32, axis: DVec3, row: Row<'_>) -> Result<(), Fault> {
+        let other = || row.fault(format!("element {} is no B31", quote(element)));
+        let &[number] = self.some_elements(element, row)?.as_slice() else { return Err(other()) };
+        let raw = &mut self.raw[number as usize];
+        let (Kind::Thin(_), &[a, b]) = (raw.kind, raw.nodes.as_slice()) else {
+            return Err(other());
+        };
+        raw.kind = Kind::Link(Link::Bolt);
+        self.sprung.insert(number);
+        let mut terms = terms(&[(a, axis), (b, -axis)]);
+        terms.push((3 * pilot, -1.0));
+        self.deck.equations.push(Equation { terms, value: 0.0, line: row.line });
         Ok(())
     }
 
