@@ -187,16 +187,21 @@ fn printed(printers: &[(&str, &str)]) -> (std::process::Output, tempfile::TempDi
     (command.args(words).arg(at("out")).output().unwrap(), place)
 }
 
-/// WeasyPrint is called as its manual says, INPUT then OUTPUT; here a copy stands in for the paper.
+/// WeasyPrint is called as its manual says, OPTIONS, INPUT and OUTPUT, and one that does not know the
+/// options without them; here a copy stands in for the paper.
 #[cfg(unix)]
 #[test]
 fn the_report_is_printed_by_command() {
-    let (output, place) = printed(&[("weasyprint", "exec /bin/cp \"$1\" \"$2\"")]);
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let read = |name: &str| fs::read_to_string(place.path().join("out").join(name)).unwrap();
-    assert_eq!(read("report.pdf"), read("report.html"));
-    assert!(read("predict.json").contains("report.pdf"));
-    assert!(String::from_utf8_lossy(&output.stdout).contains("report.pdf"));
+    let tagged = "[ \"$2\" = pdf/ua-1 ] && exec /bin/cp \"$3\" \"$4\"";
+    let old = "[ \"$1\" = --pdf-variant ] && exit 2; exec /bin/cp \"$1\" \"$2\"";
+    for script in [tagged, old] {
+        let (output, place) = printed(&[("weasyprint", script)]);
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let read = |name: &str| fs::read_to_string(place.path().join("out").join(name)).unwrap();
+        assert_eq!(read("report.pdf"), read("report.html"));
+        assert!(read("predict.json").contains("report.pdf"));
+        assert!(String::from_utf8_lossy(&output.stdout).contains("report.pdf"));
+    }
 }
 
 /// Refused before the work where nothing prints, and after it where a printer fails: nothing is

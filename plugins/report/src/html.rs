@@ -509,11 +509,15 @@ impl<'a> Page<'a> {
     fn readings(&self, m: &MemberPrediction) -> Vec<Reading> {
         let one = |r: &GaugeReading| {
             let (scale, unit) = if r.unit == "m" { (1e3, "mm") } else { (1e6, "µε") };
+            let [read, error, sound] = [r.read, r.std_error, r.sound].map(|x| scale * x);
+            // Two digits of the error.
+            let digits = (1.0 - error.abs().max(1e-6).log10().floor()).clamp(2.0, 6.0) as usize;
+            let [read, error, sound] = [read, error, sound].map(|x| number(x, digits));
             Reading {
                 gauge: r.gauge.clone(),
                 test: r.test.clone(),
-                measured: format!("{:.2} ± {:.2} {unit}", scale * r.read, scale * r.std_error),
-                expected: format!("{:.2} {unit}", scale * r.sound),
+                measured: format!("{read} ± {error} {unit}"),
+                expected: format!("{sound} {unit}"),
                 // Of what a sound member hardly moves the ratio is noise.
                 ratio: cell((r.sound.abs() > 2.0 * r.std_error).then(|| r.read / r.sound), 2),
                 z: cell(Some(r.z), 1),
@@ -758,7 +762,16 @@ fn chip(state: &str, level: Option<usize>, is_forecast: bool) -> String {
 }
 
 fn cell(value: Option<f64>, digits: usize) -> String {
-    value.map_or_else(|| NOTHING.into(), |v| format!("{v:.digits$}"))
+    value.map_or_else(|| NOTHING.into(), |v| number(v, digits))
+}
+
+/// A number with so many decimals; nothing is not less than nothing.
+fn number(value: f64, digits: usize) -> String {
+    let text = format!("{value:.digits$}");
+    match text.strip_prefix('-') {
+        Some(rest) if rest.bytes().all(|b| matches!(b, b'0' | b'.')) => rest.to_owned(),
+        _ => text,
+    }
 }
 
 fn figure(figure: Option<Figure>, scale: f64, unit: &str, digits: usize) -> [String; 3] {

@@ -5,6 +5,8 @@ use std::{collections::BTreeMap, fmt::Write};
 use askama::Template;
 use intrados_forecast::span::CANNOT_SAY;
 
+use crate::svg;
+
 const CSS: &str = include_str!("report.css");
 
 /// What is predicted of one span or member.
@@ -181,9 +183,8 @@ fn map(structures: &[Structure<'_>]) -> Map {
     let scale = (width - 20.0) / wide;
     let height = (high * scale).min(900.0) + 20.0;
     let scale = scale.min((height - 20.0) / high);
-    let mut svg = format!(
-        "<svg class=\"plot map\" viewBox=\"0 0 {width} {height:.0}\" role=\"img\" aria-label=\"Map of the structures\"><rect width=\"{width}\" height=\"{height:.0}\" fill=\"#f5f7f9\"/>"
-    );
+    let mut svg = svg::head("plot map", [width, height], "Map of the structures");
+    let _ = write!(svg, "<rect width=\"{width}\" height=\"{height:.0}\" fill=\"#f5f7f9\"/>");
     // Colours over the range that occurs, so that differences are seen; the legend says it.
     let [low, high] = poor_range(structures);
     for ([latitude, longitude], s) in places.iter().rev() {

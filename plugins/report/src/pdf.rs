@@ -57,13 +57,19 @@ pub fn print(html: &Path, pdf: &Path, job: &Job) -> Result<(), PdfError> {
     let failed = |e: io::Error| PdfError::Failed(format!("{}: {e}", printer.display()));
     let html = std::path::absolute(html).map_err(failed)?;
     let is_weasy = printer.ends_with("weasyprint");
-    // A browser has no sandbox of its own where it runs as root, and says so by failing.
-    for extra in [&[][..], &["--no-sandbox"]] {
+    let attempts: [&[&str]; 2] = match is_weasy {
+        // For screen readers; what is older does not know it.
+        true => [&["--pdf-variant", "pdf/ua-1"], &[]],
+        // A browser has no sandbox of its own where it runs as root, and says so by failing.
+        false => [&[], &["--no-sandbox"]],
+    };
+    for extra in attempts {
         let mut command = Command::new(&printer);
         if is_weasy {
-            command.arg(&html).arg(pdf);
+            command.args(extra).arg(&html).arg(pdf);
         } else {
-            command.args(["--headless", "--disable-gpu", "--no-pdf-header-footer"]).args(extra);
+            command.args(["--headless", "--disable-gpu", "--no-pdf-header-footer"]);
+            command.arg("--generate-pdf-document-outline").args(extra);
             let mut to = std::ffi::OsString::from("--print-to-pdf=");
             to.push(pdf);
             command.arg(to).arg(&html);

@@ -14,6 +14,41 @@ use crate::{
     words::word,
 };
 
+// What lines, bars and marks look like: attributes, since printers do not give a page's style to the
+// drawings in it.
+const GRID: &str = "stroke=\"#e6eaef\"";
+const AXIS: &str = "stroke=\"#1c2430\"";
+const BAR: &str = "fill=\"#3f7fb2\"";
+const TRACK: &str = "fill=\"#e9edf1\"";
+const LIMIT: &str = "stroke=\"#aab3be\"";
+const DARK: &str = "fill=\"#47586c\"";
+const PALE: &str = "fill=\"#aab6c2\"";
+const HOLLOW: &str = "fill=\"none\" stroke=\"#8a96a3\" stroke-dasharray=\"2 1.5\"";
+const WHISKER: &str = "stroke=\"#000\" stroke-width=\"1.2\" fill=\"none\"";
+const TRUTH: &str = "fill=\"#aa28be\"";
+const TRUE: &str = "stroke=\"#aa28be\" stroke-width=\"2\"";
+const AREA: &str = "fill=\"#c77700\" fill-opacity=\".25\" stroke=\"#8a5200\"";
+const CRACK: &str = "stroke=\"#8f1d1b\" stroke-width=\"2\"";
+const LEADER: &str = "stroke=\"#67727e\" stroke-width=\".7\"";
+const NUMBER: &str = "fill=\"#1c2430\" font-weight=\"600\"";
+const HALO: &str =
+    "fill=\"#fff\" stroke=\"#fff\" stroke-width=\"2.5\" font-weight=\"600\" aria-hidden=\"true\"";
+/// Of sources of evidence.
+const MARKS: [&str; 5] = [
+    "fill=\"#e08a1e\"",
+    "fill=\"#2b8a5e\"",
+    "fill=\"#0b5c94\"",
+    "fill=\"#7a4a16\"",
+    "fill=\"#1f2a37\"",
+];
+
+/// The beginning of a drawing: how large the page makes it, its own size, what it is called.
+pub(super) fn head(class: &str, [w, h]: [f64; 2], name: &str) -> String {
+    format!(
+        "<svg class=\"{class}\" viewBox=\"0 0 {w:.0} {h:.0}\" role=\"img\" font-size=\"11\" fill=\"#5b6675\"><title>{name}</title>"
+    )
+}
+
 /// Diameters of pores in classes of equal ratio (√2), with axes.
 pub(super) fn histogram(diameters: &[f64]) -> String {
     let Some(smallest) = diameters.iter().copied().filter(|d| *d > 0.0).reduce(f64::min) else {
@@ -27,14 +62,12 @@ pub(super) fn histogram(diameters: &[f64]) -> String {
     let (w, h, left, bottom) = (440.0, 170.0, 44.0, 36.0);
     let step = (w - left - 8.0) / classes as f64;
     let y = |n: f64| (h - bottom) - (h - bottom - 14.0) * n / most as f64;
-    let mut svg = format!(
-        "<svg class=\"plot\" viewBox=\"0 0 {w} {h}\" role=\"img\" aria-label=\"Histogram of pore diameters\">"
-    );
+    let mut svg = head("plot", [w, h], "Histogram of pore diameters");
     for n in ticks(most) {
         let (at, label) = (y(n as f64), n);
         let _ = write!(
             svg,
-            "<line x1=\"{left}\" x2=\"{w}\" y1=\"{at:.1}\" y2=\"{at:.1}\" class=\"grid\"/><text x=\"{:.0}\" y=\"{:.1}\" text-anchor=\"end\">{label}</text>",
+            "<line x1=\"{left}\" x2=\"{w}\" y1=\"{at:.1}\" y2=\"{at:.1}\" {GRID}/><text x=\"{:.0}\" y=\"{:.1}\" text-anchor=\"end\">{label}</text>",
             left - 5.0,
             at + 3.5
         );
@@ -43,7 +76,7 @@ pub(super) fn histogram(diameters: &[f64]) -> String {
         let (x, top) = (left + step * k as f64, y(n as f64));
         let _ = write!(
             svg,
-            "<rect x=\"{:.1}\" y=\"{top:.1}\" width=\"{:.1}\" height=\"{:.1}\" class=\"bar\"/>",
+            "<rect x=\"{:.1}\" y=\"{top:.1}\" width=\"{:.1}\" height=\"{:.1}\" {BAR}/>",
             x + 1.0,
             (step - 2.0).max(1.0),
             h - bottom - top
@@ -60,7 +93,7 @@ pub(super) fn histogram(diameters: &[f64]) -> String {
     }
     let _ = write!(
         svg,
-        "<line x1=\"{left}\" x2=\"{w}\" y1=\"{0:.1}\" y2=\"{0:.1}\" class=\"axis\"/><text x=\"{1:.0}\" y=\"{2:.0}\" text-anchor=\"middle\">equivalent diameter [mm]</text><text x=\"12\" y=\"{3:.0}\" text-anchor=\"middle\" transform=\"rotate(-90 12 {3:.0})\">pores</text></svg>",
+        "<line x1=\"{left}\" x2=\"{w}\" y1=\"{0:.1}\" y2=\"{0:.1}\" {AXIS}/><text x=\"{1:.0}\" y=\"{2:.0}\" text-anchor=\"middle\">equivalent diameter [mm]</text><text x=\"12\" y=\"{3:.0}\" text-anchor=\"middle\" transform=\"rotate(-90 12 {3:.0})\">pores</text></svg>",
         h - bottom,
         0.5 * (w + left),
         h - 4.0,
@@ -78,36 +111,30 @@ pub(super) fn gauge(
     limits: &[f64],
 ) -> String {
     let x = |d: f64| 4.0 + 152.0 * d.clamp(0.0, 1.0);
-    let mut svg = format!(
-        "<svg class=\"gauge\" viewBox=\"0 0 160 18\" role=\"img\" aria-label=\"damage {damage:.2}\"><rect x=\"4\" y=\"6\" width=\"152\" height=\"6\" class=\"track\"/>"
-    );
+    let name = format!("damage {damage:.2} ± {std_error:.2}");
+    let mut svg = head("gauge", [160.0, 18.0], &name);
+    let _ = write!(svg, "<rect x=\"4\" y=\"6\" width=\"152\" height=\"6\" {TRACK}/>");
     for &limit in limits.iter().filter(|l| **l > 0.0) {
-        let _ = write!(
-            svg,
-            "<line x1=\"{0:.1}\" x2=\"{0:.1}\" y1=\"3\" y2=\"15\" class=\"limit\"/>",
-            x(limit)
-        );
+        let _ =
+            write!(svg, "<line x1=\"{0:.1}\" x2=\"{0:.1}\" y1=\"3\" y2=\"15\" {LIMIT}/>", x(limit));
     }
     let _ = write!(
         svg,
-        "<rect x=\"4\" y=\"6\" width=\"{:.1}\" height=\"6\" class=\"{}\"/>",
+        "<rect x=\"4\" y=\"6\" width=\"{:.1}\" height=\"6\" {}/>",
         x(damage) - 4.0,
-        fill(basis)
+        fill(basis, DARK)
     );
     let (low, high) = (x(damage - 1.96 * std_error), x(damage + 1.96 * std_error));
-    let _ = write!(
-        svg,
-        "<path d=\"M{low:.1} 5v8M{low:.1} 9H{high:.1}M{high:.1} 5v8\" class=\"whisker\"/>"
-    );
+    let _ = write!(svg, "<path d=\"M{low:.1} 5v8M{low:.1} 9H{high:.1}M{high:.1} 5v8\" {WHISKER}/>");
     if let Some(t) = truth {
-        let _ = write!(svg, "<path d=\"M{0:.1} 0l3.5 5h-7z\" class=\"truth\"/>", x(t));
+        let _ = write!(svg, "<path d=\"M{0:.1} 0l3.5 5h-7z\" {TRUTH}/>", x(t));
     }
     svg + "</svg>"
 }
 
 /// What is a forecast alone is hollow.
-fn fill(basis: Basis) -> &'static str {
-    if basis == Basis::Forecast { "hollow" } else { "fill" }
+fn fill(basis: Basis, solid: &'static str) -> &'static str {
+    if basis == Basis::Forecast { HOLLOW } else { solid }
 }
 
 /// Damage along a member's axis: a bar for each zone with its 95 % interval, what each source says
@@ -117,13 +144,11 @@ pub(super) fn profile(m: &MemberPrediction) -> String {
     let step = (w - left - 8.0) / ZONES as f64;
     let x = |along: f64| left + step * ZONES as f64 * along;
     let y = |d: f64| (h - bottom) - (h - bottom - 22.0) * d.clamp(0.0, 1.0);
-    let mut svg = format!(
-        "<svg class=\"plot\" viewBox=\"0 0 {w} {h}\" role=\"img\" aria-label=\"Damage along the axis\">"
-    );
+    let mut svg = head("plot", [w, h], "Damage along the axis");
     for d in [0.0, 0.25, 0.5, 0.75, 1.0] {
         let _ = write!(
             svg,
-            "<line x1=\"{left}\" x2=\"{w}\" y1=\"{0:.1}\" y2=\"{0:.1}\" class=\"grid\"/><text x=\"{1:.0}\" y=\"{2:.1}\" text-anchor=\"end\">{d}</text>",
+            "<line x1=\"{left}\" x2=\"{w}\" y1=\"{0:.1}\" y2=\"{0:.1}\" {GRID}/><text x=\"{1:.0}\" y=\"{2:.1}\" text-anchor=\"end\">{d}</text>",
             y(d),
             left - 5.0,
             y(d) + 3.5
@@ -133,18 +158,18 @@ pub(super) fn profile(m: &MemberPrediction) -> String {
         let Some(Estimate { value, std_error }) = *known else { continue };
         let _ = write!(
             svg,
-            "<rect x=\"{:.1}\" y=\"{:.1}\" width=\"{:.1}\" height=\"{:.1}\" class=\"{}\"/>",
+            "<rect x=\"{:.1}\" y=\"{:.1}\" width=\"{:.1}\" height=\"{:.1}\" {}/>",
             x(middle(zone)) - 0.4 * step,
             y(value),
             0.8 * step,
             y(0.0) - y(value),
-            fill(m.zone_basis[zone])
+            fill(m.zone_basis[zone], PALE)
         );
         let (at, low, high) =
             (x(middle(zone)), y(value - 1.96 * std_error), y(value + 1.96 * std_error));
         let _ = write!(
             svg,
-            "<path d=\"M{0:.1} {low:.1}h6m-3 0V{high:.1}m-3 0h6\" class=\"whisker\"/>",
+            "<path d=\"M{0:.1} {low:.1}h6m-3 0V{high:.1}m-3 0h6\" {WHISKER}/>",
             at - 3.0
         );
     }
@@ -152,16 +177,17 @@ pub(super) fn profile(m: &MemberPrediction) -> String {
     let pitch = ((w - left - 8.0) / (m.evidence.len() + 1) as f64).min(96.0);
     for (k, (source, evidence)) in m.evidence.iter().enumerate() {
         let shift = (k as f64 + 0.5) / m.evidence.len() as f64 - 0.5;
-        let mark = |at: f64, d: f64| match k % 5 {
-            0 => format!("<circle cx=\"{at:.1}\" cy=\"{d:.1}\" r=\"3.2\" class=\"m0\"/>"),
+        let look = MARKS[k % MARKS.len()];
+        let mark = |at: f64, d: f64| match k % MARKS.len() {
+            0 => format!("<circle cx=\"{at:.1}\" cy=\"{d:.1}\" r=\"3.2\" {look}/>"),
             1 => format!(
-                "<rect x=\"{:.1}\" y=\"{:.1}\" width=\"6\" height=\"6\" class=\"m1\"/>",
+                "<rect x=\"{:.1}\" y=\"{:.1}\" width=\"6\" height=\"6\" {look}/>",
                 at - 3.0,
                 d - 3.0
             ),
-            2 => format!("<path d=\"M{at:.1} {:.1}l4 7h-8z\" class=\"m2\"/>", d - 4.0),
-            3 => format!("<path d=\"M{at:.1} {:.1}l4 4-4 4-4-4z\" class=\"m3\"/>", d - 4.0),
-            _ => format!("<path d=\"M{at:.1} {:.1}l4-7h-8z\" class=\"m4\"/>", d + 4.0),
+            2 => format!("<path d=\"M{at:.1} {:.1}l4 7h-8z\" {look}/>", d - 4.0),
+            3 => format!("<path d=\"M{at:.1} {:.1}l4 4-4 4-4-4z\" {look}/>", d - 4.0),
+            _ => format!("<path d=\"M{at:.1} {:.1}l4-7h-8z\" {look}/>", d + 4.0),
         };
         for (zone, reading) in
             evidence.by_zone().0.iter().enumerate().filter_map(|(zone, r)| Some((zone, (*r)?)))
@@ -182,7 +208,7 @@ pub(super) fn profile(m: &MemberPrediction) -> String {
     {
         let _ = write!(
             svg,
-            "<path d=\"M{:.1} {:.1}h{:.1}\" class=\"true\"/>",
+            "<path d=\"M{:.1} {:.1}h{:.1}\" {TRUE}/>",
             x(middle(zone)) - 0.45 * step,
             y(truth),
             0.9 * step
@@ -192,7 +218,7 @@ pub(super) fn profile(m: &MemberPrediction) -> String {
         let at = left + 8.0 + pitch * m.evidence.len() as f64;
         let _ = write!(
             svg,
-            "<path d=\"M{:.1} 7h12\" class=\"true\"/><text x=\"{:.1}\" y=\"11\">truth</text>",
+            "<path d=\"M{:.1} 7h12\" {TRUE}/><text x=\"{:.1}\" y=\"11\">truth</text>",
             at - 4.0,
             at + 12.0
         );
@@ -208,7 +234,7 @@ pub(super) fn profile(m: &MemberPrediction) -> String {
     }
     let _ = write!(
         svg,
-        "<line x1=\"{left}\" x2=\"{w}\" y1=\"{0:.1}\" y2=\"{0:.1}\" class=\"axis\"/><text x=\"{1:.0}\" y=\"{2:.0}\" text-anchor=\"middle\">place on the axis from its start [%]</text><text x=\"12\" y=\"{3:.0}\" text-anchor=\"middle\" transform=\"rotate(-90 12 {3:.0})\">damage</text></svg>",
+        "<line x1=\"{left}\" x2=\"{w}\" y1=\"{0:.1}\" y2=\"{0:.1}\" {AXIS}/><text x=\"{1:.0}\" y=\"{2:.0}\" text-anchor=\"middle\">place on the axis from its start [%]</text><text x=\"12\" y=\"{3:.0}\" text-anchor=\"middle\" transform=\"rotate(-90 12 {3:.0})\">damage</text></svg>",
         y(0.0),
         0.5 * (w + left),
         h - 4.0,
@@ -239,14 +265,12 @@ pub(super) fn course(points: &[Point]) -> String {
     let top = most.max(ticks.last().map_or(1.0, |t| *t as f64));
     let x = |age: f64| left + 16.0 + (w - left - 40.0) * (age - first) / (last - first).max(1e-9);
     let y = |percent: f64| (h - bottom) - (h - bottom - 10.0) * percent.clamp(0.0, top) / top;
-    let mut svg = format!(
-        "<svg class=\"plot\" viewBox=\"0 0 {w} {h}\" role=\"img\" aria-label=\"Course of rust\">"
-    );
+    let mut svg = head("plot", [w, h], "Course of rust");
     for tick in ticks {
         let at = y(tick as f64);
         let _ = write!(
             svg,
-            "<line x1=\"{left}\" x2=\"{w}\" y1=\"{at:.1}\" y2=\"{at:.1}\" class=\"grid\"/><text x=\"{:.0}\" y=\"{:.1}\" text-anchor=\"end\">{tick}</text>",
+            "<line x1=\"{left}\" x2=\"{w}\" y1=\"{at:.1}\" y2=\"{at:.1}\" {GRID}/><text x=\"{:.0}\" y=\"{:.1}\" text-anchor=\"end\">{tick}</text>",
             left - 5.0,
             at + 3.5
         );
@@ -255,7 +279,7 @@ pub(super) fn course(points: &[Point]) -> String {
         .iter()
         .map(|p| format!("{:.1} {:.1}", x(p.age_years), y(100.0 * p.lost.value)))
         .collect();
-    let _ = write!(svg, "<path d=\"M{}\" class=\"axis\" fill=\"none\"/>", line.join("L"));
+    let _ = write!(svg, "<path d=\"M{}\" {AXIS} fill=\"none\"/>", line.join("L"));
     for p in points {
         let Estimate { value, std_error } = p.lost;
         let (at, low, high) = (
@@ -263,10 +287,10 @@ pub(super) fn course(points: &[Point]) -> String {
             y(100.0 * (value - 1.96 * std_error)),
             y(100.0 * (value + 1.96 * std_error)),
         );
-        let look = if p.date.is_some() { "fill" } else { "hollow" };
+        let look = if p.date.is_some() { PALE } else { HOLLOW };
         let _ = write!(
             svg,
-            "<path d=\"M{0:.1} {low:.1}h6m-3 0V{high:.1}m-3 0h6\" class=\"whisker\"/><circle cx=\"{at:.1}\" cy=\"{1:.1}\" r=\"4\" class=\"{look}\"/><text x=\"{at:.1}\" y=\"{2:.1}\" text-anchor=\"middle\">{3:.0}</text>",
+            "<path d=\"M{0:.1} {low:.1}h6m-3 0V{high:.1}m-3 0h6\" {WHISKER}/><circle cx=\"{at:.1}\" cy=\"{1:.1}\" r=\"4\" {look}/><text x=\"{at:.1}\" y=\"{2:.1}\" text-anchor=\"middle\">{3:.0}</text>",
             at - 3.0,
             y(100.0 * value),
             h - bottom + 14.0,
@@ -312,14 +336,12 @@ pub(super) fn map(m: &MemberPrediction, length: f64) -> String {
     let (right, top, bottom) = (w - 10.0, strip + 10.0, h - 54.0);
     let x = |along: f64| left + (right - left) * along.clamp(0.0, 1.0);
     let y = |angle: f64| bottom - (bottom - top) * (angle.rem_euclid(360.0) / 360.0);
-    let mut svg = format!(
-        "<svg class=\"plot map\" viewBox=\"0 0 {w} {h}\" role=\"img\" aria-label=\"Unrolled surface with defects\">"
-    );
+    let mut svg = head("plot map", [w, h], "Unrolled surface with defects");
     for zone in 0..ZONES {
         let damage = m.zones.0[zone].map_or(0.0, |d| d.value);
         let _ = write!(
             svg,
-            "<rect x=\"{:.1}\" y=\"2\" width=\"{:.1}\" height=\"{strip}\" class=\"fill\" fill-opacity=\"{:.2}\"/>",
+            "<rect x=\"{:.1}\" y=\"2\" width=\"{:.1}\" height=\"{strip}\" {PALE} fill-opacity=\"{:.2}\"/>",
             x(zone as f64 / ZONES as f64),
             (right - left) / ZONES as f64 - 1.0,
             0.1 + 0.9 * damage
@@ -329,7 +351,7 @@ pub(super) fn map(m: &MemberPrediction, length: f64) -> String {
         let at = bottom - (bottom - top) * f64::from(angle) / 360.0;
         let _ = write!(
             svg,
-            "<line x1=\"{left}\" x2=\"{right}\" y1=\"{at:.1}\" y2=\"{at:.1}\" class=\"grid\"/><text x=\"{:.0}\" y=\"{:.1}\" text-anchor=\"end\">{angle}°</text>",
+            "<line x1=\"{left}\" x2=\"{right}\" y1=\"{at:.1}\" y2=\"{at:.1}\" {GRID}/><text x=\"{:.0}\" y=\"{:.1}\" text-anchor=\"end\">{angle}°</text>",
             left - 5.0,
             at + 3.5
         );
@@ -379,11 +401,14 @@ pub(super) fn map(m: &MemberPrediction, length: f64) -> String {
         if let Some([[x1, y1], [x2, y2]]) = label.leader {
             let _ = write!(
                 svg,
-                "<line x1=\"{x1:.1}\" y1=\"{y1:.1}\" x2=\"{x2:.1}\" y2=\"{y2:.1}\" class=\"leader\"/>"
+                "<line x1=\"{x1:.1}\" y1=\"{y1:.1}\" x2=\"{x2:.1}\" y2=\"{y2:.1}\" {LEADER}/>"
             );
         }
         let (at, base) = (label.area.low[0], label.area.high[1] - 0.5);
-        let _ = write!(svg, "<text x=\"{at:.1}\" y=\"{base:.1}\" class=\"no\">{number}</text>");
+        // First its halo: not everybody paints strokes below what they surround.
+        for look in [HALO, NUMBER] {
+            let _ = write!(svg, "<text x=\"{at:.1}\" y=\"{base:.1}\" {look}>{number}</text>");
+        }
     }
     svg + "</svg>"
 }
@@ -409,13 +434,13 @@ fn draw(svg: &mut String, mark: &Mark) {
     let _ = match mark {
         Mark::Box(Area { low: [x, y], high: [right, bottom] }) => write!(
             svg,
-            "<rect x=\"{x:.1}\" y=\"{y:.1}\" width=\"{:.1}\" height=\"{:.1}\" class=\"area\"/>",
+            "<rect x=\"{x:.1}\" y=\"{y:.1}\" width=\"{:.1}\" height=\"{:.1}\" {AREA}/>",
             right - x,
             bottom - y
         ),
         Mark::Line([x1, y1], [x2, y2]) => write!(
             svg,
-            "<line x1=\"{x1:.1}\" y1=\"{y1:.1}\" x2=\"{x2:.1}\" y2=\"{y2:.1}\" class=\"crack\"/>"
+            "<line x1=\"{x1:.1}\" y1=\"{y1:.1}\" x2=\"{x2:.1}\" y2=\"{y2:.1}\" {CRACK}/>"
         ),
     };
 }
@@ -428,7 +453,7 @@ mod tests {
     fn every_pore_is_in_a_class() {
         assert_eq!(histogram(&[]), "");
         let svg = histogram(&[0.1, 0.1, 0.15, 0.4]);
-        assert_eq!(svg.matches("class=\"bar\"").count(), 5);
+        assert_eq!(svg.matches(BAR).count(), 5);
         assert_eq!(ticks(9), [0, 5]);
         assert_eq!(ticks(800), [0, 200, 400, 600, 800]);
     }

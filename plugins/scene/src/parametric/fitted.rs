@@ -6,7 +6,7 @@ use glam::{Vec2, Vec3};
 use super::{Outline, lines::lines_within};
 use crate::{
     Frame, Part,
-    structure::{Reinforcement, SteelLine},
+    structure::{BarEnd, Reinforcement, SteelLine},
 };
 
 /// Places on the axis at which the section is looked at.
@@ -120,13 +120,18 @@ impl Fit<'_> {
         let is_whole = |run: &&[Option<Vec3>]| run.len() >= 2;
         let runs = moved.split(Option::is_none).filter(is_whole);
         let runs = runs.filter(|run| line.part == Part::Bar || run.len() == moved.len());
-        runs.map(|run| {
+        let runs: Vec<&[Option<Vec3>]> = runs.collect();
+        let last = runs.len().saturating_sub(1);
+        let piece = |(k, run): (usize, &&[Option<Vec3>])| {
             let points: Vec<Vec3> = run.iter().flatten().copied().collect();
             let points = if line.part == Part::Bar { straightened(&points) } else { points };
             let line_of = points.into_iter().map(|p| to_world(frame, p)).collect();
-            SteelLine { line: line_of, ..line.clone() }
-        })
-        .collect()
+            // Where there is no room between, it is cut off.
+            let own = [k == 0, k == last];
+            let ends = [0, 1].map(|i| if own[i] { line.ends[i] } else { BarEnd::Straight });
+            SteelLine { line: line_of, ends, ..line.clone() }
+        };
+        runs.iter().enumerate().map(piece).collect()
     }
 
     /// From the face to the axis of a line, m.
@@ -255,6 +260,27 @@ mod tests {
                     }
                 }
             }
+        }
+    }
+
+    /// Of a bar that has no room in a waist, the pieces have hooks where the whole has them.
+    #[test]
+    fn pieces_of_a_bar_are_hooked_at_its_own_ends_alone() {
+        let mut r = reinforcement();
+        for bars in &mut r.bars {
+            if let Bars::Row { ends, .. } = bars {
+                *ends = [BarEnd::Hooked; 2];
+            }
+        }
+        let waist = |z: f32| if (z - 4.0).abs() < 0.6 { 0.05 } else { 0.4 };
+        let lines = lines_in(frame(), &bent(|_| 0.0, waist), &r);
+        let bars: Vec<_> = lines.iter().filter(|l| l.part == Part::Bar).collect();
+        assert_eq!(bars.len(), 12);
+        for bar in bars {
+            let is_first = bar.line[0].z < 1.0;
+            let own = [BarEnd::Hooked, BarEnd::Straight];
+            let ends = if is_first { own } else { [own[1], own[0]] };
+            assert_eq!(bar.ends, ends, "{bar:?}");
         }
     }
 
