@@ -44,6 +44,8 @@ pub(super) struct Element<'a> {
     material: &'a Material,
     orientation: Option<&'a Orientation>,
     places: Vec<DVec3>,
+    /// Points of its shape.
+    rule: fn(Shape) -> Vec<Point>,
 }
 
 impl<'a> Element<'a> {
@@ -57,7 +59,14 @@ impl<'a> Element<'a> {
             material: &deck.materials[*material as usize],
             orientation: cell.orientation.map(|o| &deck.orientations[o as usize]),
             places: cell.nodes.iter().map(|&n| deck.nodes[n as usize]).collect(),
+            rule: Shape::points,
         }
+    }
+
+    /// The element by points enough for motions that its own do not feel.
+    pub(super) fn finest(mut self) -> Self {
+        self.rule = Shape::finest_points;
+        self
     }
 
     pub(super) fn shape(&self) -> Shape {
@@ -89,7 +98,7 @@ impl<'a> Element<'a> {
     /// Points of integration.
     pub(super) fn points(&self) -> Vec<Point> {
         if self.cell.points.is_empty() {
-            self.cell.shape.points()
+            (self.rule)(self.cell.shape)
         } else {
             self.cell.points.clone()
         }
