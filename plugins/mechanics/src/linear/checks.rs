@@ -137,6 +137,25 @@ fn springs_follow_their_table_and_turn() {
     near(solve(deck)[0].displacements[1].x, 1.0 + 19.0 / 90.0, 1e-9);
 }
 
+/// A node on a spring of 10 N/m that is pressed by 2 N against a stop .1 m away, and pulled off it.
+#[test]
+fn gaps_bear_once_they_have_closed() {
+    let moved = |force: f64| {
+        let deck = format!(
+            "*NODE\n1,0,0,0\n2,1,0,0\n3,2,0,0\n*ELEMENT,TYPE=SPRINGA,ELSET=S\n1,2,3\n*SPRING,ELSET=S\n10.\n\
+             *ELEMENT,TYPE=GAPUNI,ELSET=G\n2,1,2\n*GAP,ELSET=G\n.1,2.,0.,0.,,1e3,1e-3\n*BOUNDARY\n1,1,3\n2,2,3\n\
+             3,1,3\n*STEP,NLGEOM\n*STATIC\n*CLOAD\n2,1,{force:?}\n*END STEP\n"
+        );
+        solve(&deck)[0].displacements[1].x
+    };
+    let far = -moved(-2.0);
+    let closed = far - 0.1;
+    let share = 0.5 + (closed * 1e6 / PI).atan() / PI;
+    near(10.0 * far + 1e3 * closed * share, 2.0, 1e-9);
+    near(closed, 1e-3, 2e-5);
+    near(10.0 * moved(2.0) + 1e-3, 2.0, 1e-5);
+}
+
 /// A block on a soft spring whose support follows a ramp moves with the ramp, and its modes by what
 /// the ramp's corner left: u = v (t − sin(ωt)/ω).
 #[test]

@@ -276,9 +276,11 @@ fn turned(
     f: &mut [f64],
 ) -> Result<(), Folded> {
     let Some([a, b]) = spring.ends else {
-        spring.resist(k);
-        for (row, f) in k.chunks(own.len()).zip(f) {
-            *f -= row.iter().zip(own).map(|(k, u)| k * u).sum::<f64>();
+        let longer = spring.terms.iter().zip(own).map(|((_, factor), u)| factor * u).sum();
+        let [tension, stiffness] = spring.force(longer);
+        spring.outer(stiffness, k);
+        for (f, (_, factor)) in f.iter_mut().zip(&spring.terms) {
+            *f -= factor * tension;
         }
         return Ok(());
     };

@@ -8,7 +8,7 @@
 //!
 //! | subject | what |
 //! |---|---|
-//! | elements | C3D4, C3D6, C3D8, C3D8I, C3D10, C3D15, C3D20, C3D20R; CPS, CPE and CAX of 3, 4, 6 and 8 nodes and 8R, as layers of solids; S3, S4, S6, S8, S8R and B31, B32, B32R where they meet smoothly; SPRINGA (also NONLINEAR), SPRING1, SPRING2, DASHPOTA |
+//! | elements | C3D4, C3D6, C3D8, C3D8I, C3D10, C3D15, C3D20, C3D20R; CPS, CPE and CAX of 3, 4, 6 and 8 nodes and 8R, as layers of solids; S3, S4, S6, S8, S8R and B31, B32, B32R where they meet smoothly; SPRINGA (also NONLINEAR), SPRING1, SPRING2, DASHPOTA, GAPUNI |
 //! | materials | `*ELASTIC` (ISO, ORTHO, ANISO, ENGINEERING CONSTANTS), `*EXPANSION`, `*CONDUCTIVITY` (ISO, ORTHO), `*DENSITY`, `*SPECIFIC HEAT`, all by temperature; `*PLASTIC` (isotropic, kinematic and both, with NLGEOM); with NLGEOM `*HYPERELASTIC` (NEO HOOKE, MOONEY-RIVLIN, OGDEN), `*HYPERFOAM`, `*DEFORMATION PLASTICITY`; `*ORIENTATION` |
 //! | constraints | `*BOUNDARY`, `*EQUATION` (also REMOVE), `*TRANSFORM`, `*TIE`, `*RIGID BODY`, `*MPC` (MEANROT, PLANE, STRAIGHT), `*DISTRIBUTING COUPLING`, `*PRE-TENSION SECTION` |
 //! | loads | `*CLOAD`, `*DLOAD` (P, GRAV, CENTRIF), `*DSLOAD` (P), `*TEMPERATURE`, `*INITIAL CONDITIONS` (TEMPERATURE, STRESS, PLASTIC STRAIN), `*AMPLITUDE`; `*CFLUX`, `*DFLUX`, `*FILM`, `*RADIATE` |

@@ -10,7 +10,7 @@ use super::{
     law::{Elastic, ORDER},
     link::Link,
     matter::all_numbers,
-    model::{Course, Damping, Heated, Material, Procedure, Pull, Step},
+    model::{Course, Damping, Heated, Material, Procedure, Pull, Spring, Step},
     read::{Kind, Raw, Reader, Surface, plain},
     shape::Shape,
     thin::Thin,
@@ -319,8 +319,10 @@ impl Reader {
         if state.large && may_be_large {
             return self.turns();
         }
-        if !heats && self.deck.springs.iter().any(|s| !s.law.is_empty()) {
-            return Err(Fault::at(line, "a *SPRING, NONLINEAR is computed with NLGEOM alone"));
+        let bends = |s: &Spring| !s.law.is_empty() || s.gap.is_some();
+        if !heats && self.deck.springs.iter().any(bends) {
+            let why = "*SPRING, NONLINEAR and *GAP are computed with NLGEOM alone";
+            return Err(Fault::at(line, why));
         }
         let was_large = self.deck.steps.last().is_some_and(|s| s.large);
         if was_large && matches!(procedure, Procedure::Buckling { .. }) {
