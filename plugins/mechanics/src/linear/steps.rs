@@ -531,7 +531,8 @@ impl Reader {
 
     /// Nodes of planes where some are axially symmetric: all of them are in the slice then.
     pub(super) fn around_nodes(&self) -> BTreeSet<u32> {
-        let flat = |r: &&Raw| self.is_around() && matches!(r.kind, Kind::Flat(_));
+        let is_around = self.is_around();
+        let flat = |r: &&Raw| is_around && matches!(r.kind, Kind::Flat(_));
         self.raw.iter().filter(flat).flat_map(|r| r.nodes.iter().copied()).collect()
     }
 
