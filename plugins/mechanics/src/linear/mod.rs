@@ -12,7 +12,7 @@
 //! | materials | `*ELASTIC` (ISO, ORTHO, ANISO, ENGINEERING CONSTANTS), `*EXPANSION`, `*CONDUCTIVITY` (ISO, ORTHO), `*DENSITY`, `*SPECIFIC HEAT`, all by temperature; `*PLASTIC` (isotropic, kinematic and both, with NLGEOM); with NLGEOM `*HYPERELASTIC` (NEO HOOKE, MOONEY-RIVLIN, OGDEN), `*HYPERFOAM`, `*DEFORMATION PLASTICITY`; `*ORIENTATION` |
 //! | constraints | `*BOUNDARY`, `*EQUATION` (also REMOVE), `*TRANSFORM`, `*TIE`, `*RIGID BODY`, `*MPC` (MEANROT, PLANE, STRAIGHT), `*DISTRIBUTING COUPLING`, `*PRE-TENSION SECTION` |
 //! | loads | `*CLOAD`, `*DLOAD` (P, GRAV, CENTRIF), `*DSLOAD` (P), `*TEMPERATURE`, `*INITIAL CONDITIONS` (TEMPERATURE, STRESS, PLASTIC STRAIN), `*AMPLITUDE`; `*CFLUX`, `*DFLUX`, `*FILM`, `*RADIATE` |
-//! | steps | `*STATIC`, `*FREQUENCY`, `*BUCKLE`, `*HEAT TRANSFER` (steady, in time, FREQUENCY), `*STATIC` with `NLGEOM` of all but C3D8I, B31, S4; `*DYNAMIC` with the same (implicit; `*DAMPING`), `*MODAL DYNAMIC` and harmonic `*STEADY STATE DYNAMICS` by the modes of the `*FREQUENCY` before, with `*MODAL DAMPING`; `OP=MOD` and `OP=NEW` |
+//! | steps | `*STATIC`, `*FREQUENCY`, `*BUCKLE`, `*HEAT TRANSFER` (steady, in time, FREQUENCY), `*STATIC` with `NLGEOM`; `*DYNAMIC` with the same (implicit; `*DAMPING`), `*MODAL DYNAMIC` and harmonic `*STEADY STATE DYNAMICS` by the modes of the `*FREQUENCY` before, with `*MODAL DAMPING`; `OP=MOD` and `OP=NEW` |
 //!
 //! Everything else is refused in one line that names all of it.
 //!

@@ -12,7 +12,6 @@ use super::{
     matter::all_numbers,
     model::{Course, Damping, Heated, Material, Procedure, Pull, Spring, Step},
     read::{Kind, Raw, Reader, Surface, plain},
-    shape::Shape,
     thin::Thin,
     tie::{self, Face},
     warm::is_temperature,
@@ -363,20 +362,11 @@ impl Reader {
 
     /// Every element is known where displacements are large.
     fn turns(&self) -> Result<(), Fault> {
-        let lacks = |kind: Kind| match kind {
-            Kind::Solid(Shape::Hex8Bubbles)
-            | Kind::Thin(
-                Thin::Beam { shape: Shape::Hex8Bubbles, .. }
-                | Thin::Shell { shape: Shape::Hex8Bubbles, .. },
-            ) => Some("C3D8I, B31 and S4"),
-            Kind::Link(Link::Damper) => Some("dashpots"),
-            _ => None,
-        };
-        match self.raw.iter().find_map(|raw| Some((raw, lacks(raw.kind)?))) {
+        match self.raw.iter().find(|raw| raw.kind == Kind::Link(Link::Damper)) {
             None => Ok(()),
-            Some((raw, what)) => {
-                let why = "are not computed where displacements are large (NLGEOM)";
-                Err(Fault::at(raw.line, format!("element {}: {what} {why}", raw.label)))
+            Some(raw) => {
+                let why = "dashpots are not computed where displacements are large (NLGEOM)";
+                Err(Fault::at(raw.line, format!("element {}: {why}", raw.label)))
             }
         }
     }
