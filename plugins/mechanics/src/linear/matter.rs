@@ -352,16 +352,9 @@ impl Reader {
             Some(row) => DVec3::from_slice(&row.numbers("x, y, z of the 1-direction", 3..=3)?),
             None => DVec3::NEG_Z,
         };
-        let round = card.word("SECTION").is_some_and(|s| s == "CIRC");
-        if round {
-            self.deck.notes.push(format!(
-                "line {}: SECTION=CIRC has diameters as in CalculiX (in Abaqus a radius), and an outline of parabolas that encloses 1.2 % less",
-                card.line
-            ));
-        }
         let (size, hollow) = match (card.word("SECTION").as_deref(), sizes.as_slice()) {
-            (Some("RECT" | "CIRC"), &[a, b]) => ([a, b], None),
-            (Some("RECT" | "CIRC"), &[a]) => ([a, a], None),
+            (Some("RECT"), &[a, b]) => ([a, b], None),
+            (Some("RECT"), &[a]) => ([a, a], None),
             (Some("PIPE"), &[radius, wall]) if wall < radius => {
                 ([2.0 * radius; 2], Some(Hollow::Pipe(wall)))
             }
@@ -373,7 +366,7 @@ impl Reader {
             }
             _ => {
                 return Err(card.fault(
-                    "sections are RECT and CIRC (two sizes), PIPE (outer radius, wall) and BOX (two sizes, walls of one thickness)",
+                    "sections are RECT (two sizes), PIPE (outer radius, wall) and BOX (two sizes, walls of one thickness)",
                 ));
             }
         };
@@ -381,13 +374,11 @@ impl Reader {
             material: self.named_material(card, &card.need("MATERIAL")?)?,
             orientation: None,
             thickness: size[0],
-            profile: Profile::Beam { first, size, hollow, round },
+            profile: Profile::Beam { first, size, hollow },
         };
         self.assign(card, &section, |kind| match kind {
-            // Tubes are integrated at two sections, and straight edges are no circle.
             Kind::Thin(Thin::Beam { shape, .. }) => {
-                (hollow.is_none() || shape == Shape::Hex20Reduced)
-                    && (!round || shape != Shape::Hex8Bubbles)
+                hollow.is_none() || shape == Shape::Hex20Reduced
             }
             _ => false,
         })

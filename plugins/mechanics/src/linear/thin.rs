@@ -7,7 +7,7 @@
 
 use std::{
     collections::{BTreeMap, HashMap},
-    f64::consts::{FRAC_PI_4, PI, SQRT_2},
+    f64::consts::{FRAC_PI_4, PI},
 };
 
 use glam::DVec3;
@@ -40,7 +40,7 @@ pub(super) enum Profile {
     /// material and axes of every layer from below, where it has some.
     Shell { offset: f64, layers: Vec<(f64, u32, Option<u32>)> },
     /// Its 1-direction, and its sizes along both.
-    Beam { first: DVec3, size: [f64; 2], hollow: Option<Hollow>, round: bool },
+    Beam { first: DVec3, size: [f64; 2], hollow: Option<Hollow> },
 }
 
 /// A hollow section.
@@ -61,8 +61,6 @@ pub(super) struct Ring {
     between: Vec<(u32, [u32; 2])>,
     /// Whether nodes between the outer ones are kept there.
     stiff: bool,
-    /// How far those lie from the middle, over how far they would on straight edges.
-    bulge: f64,
 }
 
 /// Axes of a node: normal of a shell; tangent and 1-direction of a beam; and sizes.
@@ -73,7 +71,6 @@ struct Axes {
     second: DVec3,
     sizes: [f64; 2],
     quadratic: bool,
-    round: bool,
 }
 
 /// Angles up to which axes of neighbours are one, degrees: of beams and of shells.
@@ -123,12 +120,11 @@ impl Thin {
                         second: DVec3::ZERO,
                         sizes: [section.thickness, *offset],
                         quadratic: self.shape().nodes() > 8,
-                        round: false,
                     })
                 };
                 face_places(places.len()).iter().map(normal).collect()
             }
-            (Self::Beam { .. }, Profile::Beam { first, size, round, .. }) => {
+            (Self::Beam { .. }, Profile::Beam { first, size, .. }) => {
                 let axes = |tangent: DVec3| {
                     let tangent = tangent.try_normalize()?;
                     Some(Axes {
@@ -137,7 +133,6 @@ impl Thin {
                         second: tangent,
                         sizes: *size,
                         quadratic: self.shape().nodes() > 8,
-                        round: *round,
                     })
                 };
                 let tangents = match *places {
@@ -196,9 +191,7 @@ impl Axes {
             a.dot(b)
                 >= a.length() * b.length() * ALIKE[usize::from(!self.of_beam)].to_radians().cos()
         };
-        let alike = self.of_beam == other.of_beam
-            && self.quadratic == other.quadratic
-            && self.round == other.round;
+        let alike = self.of_beam == other.of_beam && self.quadratic == other.quadratic;
         let along = !self.of_beam || near(self.second, other.second);
         alike && self.sizes == other.sizes && near(self.first, other.first) && along
     }
@@ -258,12 +251,7 @@ impl Reader {
         if let (Some(step), false) = (supported, ring.stiff) {
             for (middle, [a, b]) in &ring.between {
                 for i in 0..3 {
-                    let mut terms = vec![(3 * middle + i, 1.0)];
-                    terms.extend([a, b].map(|n| (3 * n + i, -0.5 * ring.bulge)));
-                    if ring.bulge != 1.0 {
-                        let share = (ring.bulge - 1.0) / ring.outer.len() as f64;
-                        terms.extend(ring.outer.iter().map(|n| (3 * n + i, share)));
-                    }
+                    let terms = vec![(3 * middle + i, 1.0), (3 * a + i, -0.5), (3 * b + i, -0.5)];
                     self.deck.later.push((step, Equation { terms, value: 0.0, line: row.line }));
                 }
             }
@@ -307,9 +295,7 @@ fn make_ring(deck: &mut Deck, node: u32, axes: &Axes, ends: bool) -> Ring {
         deck.twins.insert(number, node);
         number
     };
-    // On a circle corners lie as far out as the middles of edges.
-    let bulge = if axes.round { SQRT_2 } else { 1.0 };
-    let mut ring = Ring { bulge, ..Ring::default() };
+    let mut ring = Ring::default();
     if axes.of_beam {
         let tangent = axes.second.normalize_or_zero();
         let first = axes.first.reject_from_normalized(tangent).normalize_or_zero();
@@ -318,7 +304,7 @@ fn make_ring(deck: &mut Deck, node: u32, axes: &Axes, ends: bool) -> Ring {
             middle + 0.5 * (a * axes.sizes[0] * first + b * axes.sizes[1] * second)
         };
         let corners = [[-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0], [1.0, 1.0]];
-        ring.outer = corners.map(|c| add(at(c.map(|c| c / bulge)))).to_vec();
+        ring.outer = corners.map(|c| add(at(c))).to_vec();
         if ends {
             let edges = [[-1.0, 0.0], [0.0, -1.0], [1.0, 0.0], [0.0, 1.0]];
             for (i, edge) in edges.into_iter().enumerate() {
