@@ -9,12 +9,15 @@ use intrados_stage::Job;
 use super::{
     element::Folded,
     large::{Settled, about, ends, of_element, settled, started, unbalanced},
-    model::{Deck, Procedure, Step},
+    model::{Cell, Deck, Procedure, Step},
     plastic::Flow,
     shape::Shape,
     solve::{LinearError, Loads, Past, Solved, System, unknowns},
 };
-use crate::sparse::{Constraints, Method, solve as direct};
+use crate::{
+    sparse::{Constraints, Method, solve as direct},
+    tensor,
+};
 
 /// Error of an increment, over the largest displacement, where increments are not fixed.
 const ACCURACY: f64 = 1e-4;
@@ -152,6 +155,19 @@ impl Course<'_> {
         Ok(own)
     }
 
+    /// What holds an element against what begins suddenly, and its hidden motions as well.
+    fn firm(&self, system: &System<'_>, e: usize, place: &[f64]) -> Result<Vec<f64>, Folded> {
+        let (element, warmth) = (system.element(e).finest(), system.warmth(e));
+        let (mut k, mut f) = (vec![0.0; place.len() * place.len()], vec![0.0; place.len()]);
+        let none = |_| tensor::ZERO;
+        if self.step.large {
+            element.large(&element.moved(place), &warmth, none, &[], &mut k, &mut f)?;
+        } else {
+            element.stiffness(&warmth, none, &mut k, &mut f)?;
+        }
+        Ok(k)
+    }
+
     /// β and γ of Newmark's method.
     fn weights(&self) -> [f64; 2] {
         [0.25 * (1.0 - self.alpha) * (1.0 - self.alpha), 0.5 - self.alpha]
@@ -173,8 +189,13 @@ impl Course<'_> {
         };
         let holds = (1.0 + self.alpha) * self.weights()[0] * sudden * sudden;
         let (mass, mut rhs) = system.assembled(job, |e, m, f| {
-            let own = self.own((&system, &loads), e, [&of(e, &place), &of(e, &speed)], &flow)?;
-            let parts = own.mass.iter().zip(&own.stiffness);
+            let at = of(e, &place);
+            let own = self.own((&system, &loads), e, [&at, &of(e, &speed)], &flow)?;
+            // Of a metal its own points alone know what has flowed.
+            let is_metal = |c: &Cell| self.deck.materials[c.material as usize].plastic.is_some();
+            let is_firm = self.deck.cells.get(e).is_some_and(|c| !is_metal(c));
+            let firm = if is_firm { self.firm(&system, e, &at)? } else { own.stiffness };
+            let parts = own.mass.iter().zip(&firm);
             m.iter_mut().zip(parts).for_each(|(all, (m, k))| *all = m + holds * k);
             f.copy_from_slice(&own.open);
             Ok(())

@@ -11,6 +11,11 @@ use super::{
 };
 use crate::tensor::{self, Frame, Tangent, Voigt};
 
+/// Newton's steps to where bubbles bear nothing.
+const STEPS: usize = 20;
+/// Change of theirs, over the size of the element, whose square is nothing.
+const SETTLED: f64 = 1e-8;
+
 /// An element that is flat or turned inside out.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Folded;
@@ -44,6 +49,8 @@ pub(super) struct Element<'a> {
     material: &'a Material,
     orientation: Option<&'a Orientation>,
     places: Vec<DVec3>,
+    /// Points of its shape.
+    rule: fn(Shape) -> Vec<Point>,
 }
 
 impl<'a> Element<'a> {
@@ -57,7 +64,14 @@ impl<'a> Element<'a> {
             material: &deck.materials[*material as usize],
             orientation: cell.orientation.map(|o| &deck.orientations[o as usize]),
             places: cell.nodes.iter().map(|&n| deck.nodes[n as usize]).collect(),
+            rule: Shape::points,
         }
+    }
+
+    /// The element by points enough for motions that its own do not feel.
+    pub(super) fn finest(mut self) -> Self {
+        self.rule = Shape::finest_points;
+        self
     }
 
     pub(super) fn shape(&self) -> Shape {
@@ -89,7 +103,7 @@ impl<'a> Element<'a> {
     /// Points of integration.
     pub(super) fn points(&self) -> Vec<Point> {
         if self.cell.points.is_empty() {
-            self.cell.shape.points()
+            (self.rule)(self.cell.shape)
         } else {
             self.cell.points.clone()
         }
@@ -152,18 +166,10 @@ impl<'a> Element<'a> {
         k: &mut [f64],
         f: &mut [f64],
     ) -> Result<(), Folded> {
-        let n = 3 * self.places.len();
-        let Some((bubbles, forces)) = self.summed(warmth, &initial, k, f)? else { return Ok(()) };
-        // What the bubbles do follows from the rest: they bear no force from outside.
-        let (inside, across) = (bubbles.view((n, n), (9, 9)), bubbles.view((n, 0), (9, n)));
-        let inverse = inside.into_owned().cholesky().ok_or(Folded)?;
-        let carried = across.transpose() * inverse.solve(&across.into_owned());
-        let pushed = across.transpose() * inverse.solve(&forces.rows(n, 9).into_owned());
-        for i in 0..n {
-            (0..n).for_each(|j| k[i * n + j] += bubbles[(i, j)] - carried[(i, j)]);
-            f[i] += forces[i] - pushed[i];
+        match self.summed(warmth, &initial, k, f)? {
+            Some((all, forces)) => condensed(&all, &forces, k, f),
+            None => Ok(()),
         }
-        Ok(())
     }
 
     /// Sums over the points: into `k` and `f`, or, where there are bubbles, into a matrix and a
@@ -271,7 +277,8 @@ impl<'a> Element<'a> {
 
     /// A point where displacements are large: how its surroundings are deformed beside what warms
     /// them, and the stress of that along them (second Piola-Kirchhoff), by the law as it is for
-    /// small strains (St. Venant and Kirchhoff). `self` is the element as it was, without bubbles.
+    /// small strains (St. Venant and Kirchhoff). `self` is the element as it was; where it has bubbles,
+    /// `moved` has them after its nodes.
     fn stretched(
         &self,
         moved: &Self,
@@ -280,7 +287,7 @@ impl<'a> Element<'a> {
         initial: &impl Fn(usize) -> Voigt,
         flow: &[Flow],
     ) -> Result<Stretched, Folded> {
-        let mut at = self.at(natural, weight)?;
+        let mut at = self.bubbled(natural, weight)?;
         let (law, free) = self.local(p, &at, warmth);
         let metal = self.metal(p, self.warmth(p, &at, warmth)[0]);
         let swelling = swelling(&free);
@@ -334,10 +341,55 @@ impl<'a> Element<'a> {
         k: &mut [f64],
         f: &mut [f64],
     ) -> Result<(), Folded> {
-        let n = self.places.len();
+        if self.cell.shape != Shape::Hex8Bubbles {
+            return self.pushed(moved, warmth, &initial, flow, k, f);
+        }
+        let (_, all, forces) = self.filled(moved, warmth, &initial, flow)?;
+        condensed(&all, &forces, k, f)
+    }
+
+    /// The moved element with its bubbles where they bear nothing, and tangent and forces there.
+    fn filled(
+        &self,
+        moved: &Self,
+        warmth: &Warmth,
+        initial: &impl Fn(usize) -> Voigt,
+        flow: &[Flow],
+    ) -> Result<(Self, DMatrix<f64>, DVector<f64>), Folded> {
+        let mut filled = moved.clone();
+        filled.places.extend([DVec3::ZERO; 3]);
+        let (n, size) = (3 * self.places.len(), 3 * filled.places.len());
+        let small = SETTLED * self.places[0].distance(self.places[6]);
+        for _ in 0..STEPS {
+            let (mut all, mut forces) = (DMatrix::zeros(size, size), DVector::zeros(size));
+            let (k, f) = (all.as_mut_slice(), forces.as_mut_slice());
+            self.pushed(&filled, warmth, initial, flow, k, f)?;
+            let inside = all.view((n, n), (9, 9)).into_owned().lu();
+            let change = inside.solve(&forces.rows(n, 9).into_owned()).ok_or(Folded)?;
+            let changes = change.as_slice().as_chunks::<3>().0.iter();
+            let bubbles = filled.places.iter_mut().skip(self.places.len());
+            bubbles.zip(changes).for_each(|(place, by)| *place += DVec3::from_array(*by));
+            if change.norm() <= small {
+                return Ok((filled, all, forces));
+            }
+        }
+        Err(Folded)
+    }
+
+    /// Sums over the points, where bubbles are where `moved` has them.
+    fn pushed(
+        &self,
+        moved: &Self,
+        warmth: &Warmth,
+        initial: &impl Fn(usize) -> Voigt,
+        flow: &[Flow],
+        k: &mut [f64],
+        f: &mut [f64],
+    ) -> Result<(), Folded> {
+        let n = moved.places.len();
         for point in self.points().into_iter().enumerate() {
             let Stretched { at, law, axes, stress, .. } =
-                self.stretched(moved, point, warmth, &initial, flow)?;
+                self.stretched(moved, point, warmth, initial, flow)?;
             let all: Vec<[Voigt; 3]> = at.slopes.iter().map(|s| turned(&axes, s)).collect();
             for (a, own) in all.iter().enumerate() {
                 let pulled = DVec3::from_array(transposed_times(&at.slopes[a], &stress));
@@ -367,8 +419,12 @@ impl<'a> Element<'a> {
         initial: impl Fn(usize) -> Voigt,
         flow: &[Flow],
     ) -> Result<Vec<(Voigt, Flow)>, Folded> {
+        let filled = match self.cell.shape {
+            Shape::Hex8Bubbles => self.filled(moved, warmth, &initial, flow)?.0,
+            _ => moved.clone(),
+        };
         let stress = |point| {
-            let there = self.stretched(moved, point, warmth, &initial, flow)?;
+            let there = self.stretched(&filled, point, warmth, &initial, flow)?;
             let [x, y, z] = there.axes.map(|a| Vector3::new(a.x, a.y, a.z));
             let deformed = Matrix3::from_columns(&[x, y, z]);
             let s = there.stress;
@@ -505,6 +561,27 @@ struct Stretched {
     volume: f64,
     stress: Voigt,
     flow: Flow,
+}
+
+/// Adds what is left of nodes and nine unknowns of bubbles: these bear no force from outside, so that
+/// what they do follows from the rest.
+fn condensed(
+    all: &DMatrix<f64>,
+    forces: &DVector<f64>,
+    k: &mut [f64],
+    f: &mut [f64],
+) -> Result<(), Folded> {
+    let n = f.len();
+    let across = all.view((n, 0), (9, n)).into_owned();
+    let inside = all.view((n, n), (9, 9)).into_owned().lu();
+    let carried = across.transpose() * inside.solve(&across).ok_or(Folded)?;
+    let bubbles = inside.solve(&forces.rows(n, 9).into_owned()).ok_or(Folded)?;
+    let pushed = across.transpose() * bubbles;
+    for i in 0..n {
+        (0..n).for_each(|j| k[i * n + j] += all[(i, j)] - carried[(i, j)]);
+        f[i] += forces[i] - pushed[i];
+    }
+    Ok(())
 }
 
 /// 1 + free strain, as a matrix.

@@ -69,9 +69,12 @@ impl Finite {
     }
 
     fn stress(&self, strain: &Voigt) -> Option<Voigt> {
+        if !strain.iter().all(|e| e.is_finite()) {
+            return None;
+        }
         let found = metric(strain).symmetric_eigen();
         let squares = found.eigenvalues;
-        if squares.min() <= 0.0 || !squares.sum().is_finite() {
+        if squares.min() <= 0.0 {
             return None;
         }
         let forces = self.principal([squares[0], squares[1], squares[2]].map(f64::sqrt));

@@ -278,9 +278,11 @@ fn turned(
     f: &mut [f64],
 ) -> Result<(), Folded> {
     let Some([a, b]) = spring.ends else {
-        spring.resist(k);
-        for (row, f) in k.chunks(own.len()).zip(f) {
-            *f -= row.iter().zip(own).map(|(k, u)| k * u).sum::<f64>();
+        let longer = spring.terms.iter().zip(own).map(|((_, factor), u)| factor * u).sum();
+        let [tension, stiffness] = spring.force(longer);
+        spring.outer(stiffness, k);
+        for (f, (_, factor)) in f.iter_mut().zip(&spring.terms) {
+            *f -= factor * tension;
         }
         return Ok(());
     };
@@ -361,7 +363,8 @@ mod tests {
     #[test]
     fn tangents_are_differences_of_forces() {
         let pressed = BRICK.replace("*END STEP", "*DLOAD\nE,P2,9.\nE,P4,-5.\n*END STEP");
-        for (text, both) in [(BRICK, false), (pressed.as_str(), true)] {
+        let bubbles = BRICK.replace("C3D8", "C3D8I");
+        for (text, both) in [(BRICK, false), (pressed.as_str(), true), (bubbles.as_str(), false)] {
             let deck = parse(text.as_bytes(), Path::new("deck.inp"), Units::MetreNewton).unwrap();
             let (step, past) = (&deck.steps[0], Past::of(&deck));
             let sums = vec![Sum::default(); 3 * deck.nodes.len()];

@@ -10,7 +10,7 @@ use super::{
     curve::{Curve, Curved, terms},
     matter::all_numbers,
     mesh::name_of,
-    model::Spring,
+    model::{Gap, Spring},
     read::{Kind, Reader, Surface, plain},
 };
 use crate::read::{
@@ -32,6 +32,8 @@ pub(super) enum Link {
     Damper,
     /// A B31 that a `*PRE-TENSION SECTION` stands for.
     Bolt,
+    /// GAPUNI: bears along a direction once two nodes have come near.
+    Gap,
     /// DCOUP3D: the node of a `*DISTRIBUTING COUPLING`.
     Coupling,
 }
@@ -43,6 +45,7 @@ impl Link {
             "SPRING1" => Some(Self::Ground),
             "SPRING2" => Some(Self::Components),
             "DASHPOTA" => Some(Self::Damper),
+            "GAPUNI" => Some(Self::Gap),
             "DCOUP3D" => Some(Self::Coupling),
             _ => None,
         }
@@ -50,7 +53,7 @@ impl Link {
 
     pub(super) fn nodes(self) -> usize {
         match self {
-            Self::Between | Self::Damper | Self::Components | Self::Bolt => 2,
+            Self::Between | Self::Damper | Self::Components | Self::Gap | Self::Bolt => 2,
             Self::Ground | Self::Coupling => 1,
         }
     }
@@ -61,6 +64,7 @@ impl Reader {
         match plain(card).as_str() {
             "SPRING" => self.spring(card),
             "DASHPOT" => self.dashpot(card),
+            "GAP" => self.gap(card),
             "MPC" => self.multiple(card),
             "RIGIDBODY" => self.rigid_body(card),
             "DISTRIBUTINGCOUPLING" => self.coupling(card),
@@ -97,7 +101,7 @@ impl Reader {
             let ends: Option<[u32; 2]> =
                 raw.nodes.as_slice().try_into().ok().filter(|_| link == Link::Between);
             let (law, drag) = (law.clone(), Vec::new());
-            self.deck.springs.push(Spring { terms, ends, stiffness, law, drag });
+            self.deck.springs.push(Spring { terms, ends, stiffness, law, drag, gap: None });
             self.sprung.insert(element);
         }
         Ok(())
@@ -136,8 +140,46 @@ impl Reader {
             let why =
                 || card.fault(format!("element {} is no dashpot, or has no length", raw.label));
             let (terms, drag) = (found.ok_or_else(why)?, drag.clone());
-            let spring = Spring { terms, ends: None, stiffness: 0.0, law: Vec::new(), drag };
-            self.deck.springs.push(spring);
+            let (ends, law, gap) = (None, Vec::new(), None);
+            self.deck.springs.push(Spring { terms, ends, stiffness: 0.0, law, drag, gap });
+            self.sprung.insert(element);
+        }
+        Ok(())
+    }
+
+    /// How wide it is, the direction in which it opens, stiffness once it has closed, and the pull
+    /// where it is far open.
+    fn gap(&mut self, card: &Card<'_>) -> Result<(), Fault> {
+        card.only(&["ELSET"])?;
+        let what = "clearance, x, y, z of the direction, , stiffness, pull";
+        let row = card.one_row()?.ok_or_else(|| card.fault(format!("needed are: {what}")))?;
+        let words: Vec<&str> = row.fields().collect();
+        let number = |i: usize, usual: f64| match words.get(i) {
+            Some(word) if !word.is_empty() => row.number(word),
+            _ => Ok(usual),
+        };
+        let direction = DVec3::new(number(1, 0.0)?, number(2, 0.0)?, number(3, 0.0)?);
+        let direction = direction.try_normalize().ok_or_else(|| row.fault("no direction"))?;
+        let (stiffness, pull) = (number(5, 1e12)?, number(6, 1e-3)?);
+        if words.len() > 7 || stiffness.is_nan() || stiffness <= 0.0 || pull.is_nan() || pull <= 0.0
+        {
+            return Err(row.fault(format!("needed are: {what}, the last two above 0")));
+        }
+        let length = self.units.length();
+        let gap = Gap {
+            clearance: number(0, 0.0)? * length,
+            stiffness: stiffness * self.units.stress() * length,
+            pull: pull * self.units.stress() * length * length,
+        };
+        for element in self.named_elements(card)? {
+            let raw = &self.raw[element as usize];
+            let (Kind::Link(Link::Gap), &[a, b]) = (raw.kind, raw.nodes.as_slice()) else {
+                return Err(card.fault(format!("element {} is no GAPUNI", raw.label)));
+            };
+            let terms = terms(&[(a, -direction), (b, direction)]);
+            let (ends, stiffness, law, drag) = (None, 0.0, Vec::new(), Vec::new());
+            let gap = Some(gap);
+            self.deck.springs.push(Spring { terms, ends, stiffness, law, drag, gap });
             self.sprung.insert(element);
         }
         Ok(())

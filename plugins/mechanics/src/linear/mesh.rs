@@ -139,6 +139,15 @@ impl Reader {
         let kind = card.word("TYPE").and_then(|t| kind(&t));
         let kind = kind.ok_or_else(|| card.fault("*ELEMENT needs TYPE=…"))?;
         let first = self.raw.len() as u32;
+        // CalculiX reads no further than an element has nodes.
+        let more = |row: &Row<'_>| row.fields().count() > kind.nodes() + 1;
+        if let Some(row) = card.rows().find(more) {
+            let own = kind.nodes();
+            self.deck.notes.push(format!(
+                "line {}: of an element with more than {own} nodes the first {own} are its own",
+                row.line
+            ));
+        }
         let mut rows = card.rows();
         while let Some(row) = rows.next() {
             let element = self.element(kind, row, &mut rows)?;
@@ -163,7 +172,7 @@ impl Reader {
         row: Row<'a>,
         rows: &mut impl Iterator<Item = Row<'a>>,
     ) -> Result<Raw, Fault> {
-        let mut fields: Vec<&str> = row.fields().collect();
+        let mut fields: Vec<&str> = row.fields().take(kind.nodes() + 1).collect();
         while fields.len() < kind.nodes() + 1 {
             let next = rows.next().ok_or_else(|| {
                 row.fault(format!("{} nodes, not {}", fields.len() - 1, kind.nodes()))
@@ -305,7 +314,7 @@ impl Reader {
         let open = |(i, raw): (usize, &Raw)| {
             let open = matches!(raw.kind, Kind::Link(_)) && !self.sprung.contains(&(i as u32));
             open.then(|| {
-                let why = "has no *SPRING, *DASHPOT or *DISTRIBUTING COUPLING";
+                let why = "has no *SPRING, *DASHPOT, *GAP or *DISTRIBUTING COUPLING";
                 Fault::at(raw.line, format!("element {} {why}", raw.label))
             })
         };

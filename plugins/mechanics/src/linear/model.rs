@@ -1,6 +1,9 @@
 //! What a deck says, in SI and by positions.
 
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::{
+    collections::{BTreeMap, BTreeSet, HashMap},
+    f64::consts::PI,
+};
 
 use glam::DVec3;
 
@@ -94,11 +97,38 @@ pub(super) struct Spring {
     pub(super) law: Vec<(f64, f64)>,
     /// Of a dashpot: frequency, Hz, and N·s/m.
     pub(super) drag: Vec<(f64, f64)>,
+    pub(super) gap: Option<Gap>,
+}
+
+/// What bears once it has closed: F = K d (½ + atan(d/ε)/π) where it has by d, ε = π c/K. Far open,
+/// it is pulled by c.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Gap {
+    /// m.
+    pub(super) clearance: f64,
+    /// K, N/m.
+    pub(super) stiffness: f64,
+    /// c, N.
+    pub(super) pull: f64,
+}
+
+impl Gap {
+    /// Tension when it is so much wider, and by how much that grows.
+    fn force(&self, wider: f64) -> [f64; 2] {
+        let closed = -wider - self.clearance;
+        let at = closed * self.stiffness / (PI * self.pull);
+        let share = 0.5 + at.atan() / PI;
+        let slope = share + at / (PI * (1.0 + at * at));
+        [-self.stiffness * closed * share, self.stiffness * slope]
+    }
 }
 
 impl Spring {
     /// Its force when it is so much longer, and by how much that grows.
     pub(super) fn force(&self, longer: f64) -> [f64; 2] {
+        if let Some(gap) = self.gap {
+            return gap.force(longer);
+        }
         let i = self.law.partition_point(|p| p.0 <= longer);
         match (i.checked_sub(1).and_then(|i| self.law.get(i)), self.law.get(i)) {
             (Some(&(x, f)), Some(&(y, g))) => {

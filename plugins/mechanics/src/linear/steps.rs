@@ -10,9 +10,8 @@ use super::{
     law::{Elastic, ORDER},
     link::Link,
     matter::all_numbers,
-    model::{Course, Damping, Heated, Material, Procedure, Pull, Step},
+    model::{Course, Damping, Heated, Material, Procedure, Pull, Spring, Step},
     read::{Kind, Raw, Reader, Surface, plain},
-    shape::Shape,
     thin::Thin,
     tie::{self, Face},
     warm::is_temperature,
@@ -339,8 +338,10 @@ impl Reader {
         if state.large && may_be_large {
             return self.turns();
         }
-        if !heats && self.deck.springs.iter().any(|s| !s.law.is_empty()) {
-            return Err(Fault::at(line, "a *SPRING, NONLINEAR is computed with NLGEOM alone"));
+        let bends = |s: &Spring| !s.law.is_empty() || s.gap.is_some();
+        if !heats && self.deck.springs.iter().any(bends) {
+            let why = "*SPRING, NONLINEAR and *GAP are computed with NLGEOM alone";
+            return Err(Fault::at(line, why));
         }
         let was_large = self.deck.steps.last().is_some_and(|s| s.large);
         if was_large && matches!(procedure, Procedure::Buckling { .. }) {
@@ -381,20 +382,11 @@ impl Reader {
 
     /// Every element is known where displacements are large.
     fn turns(&self) -> Result<(), Fault> {
-        let lacks = |kind: Kind| match kind {
-            Kind::Solid(Shape::Hex8Bubbles)
-            | Kind::Thin(
-                Thin::Beam { shape: Shape::Hex8Bubbles, .. }
-                | Thin::Shell { shape: Shape::Hex8Bubbles, .. },
-            ) => Some("C3D8I, B31 and S4"),
-            Kind::Link(Link::Damper) => Some("dashpots"),
-            _ => None,
-        };
-        match self.raw.iter().find_map(|raw| Some((raw, lacks(raw.kind)?))) {
+        match self.raw.iter().find(|raw| raw.kind == Kind::Link(Link::Damper)) {
             None => Ok(()),
-            Some((raw, what)) => {
-                let why = "are not computed where displacements are large (NLGEOM)";
-                Err(Fault::at(raw.line, format!("element {}: {what} {why}", raw.label)))
+            Some(raw) => {
+                let why = "dashpots are not computed where displacements are large (NLGEOM)";
+                Err(Fault::at(raw.line, format!("element {}: {why}", raw.label)))
             }
         }
     }
@@ -557,7 +549,8 @@ impl Reader {
 
     /// Nodes of planes where some are axially symmetric: all of them are in the slice then.
     pub(super) fn around_nodes(&self) -> BTreeSet<u32> {
-        let flat = |r: &&Raw| self.is_around() && matches!(r.kind, Kind::Flat(_));
+        let is_around = self.is_around();
+        let flat = |r: &&Raw| is_around && matches!(r.kind, Kind::Flat(_));
         self.raw.iter().filter(flat).flat_map(|r| r.nodes.iter().copied()).collect()
     }
 

@@ -383,6 +383,9 @@ fn faults_are_named_with_their_lines() {
     let line = refusal(&good.replace("3,1,1.\n", "99,1,1.\n3,7,1.\n"));
     // A card ends at its first fault; the next card is read all the same.
     assert!(line.contains("node 99 is not defined"), "{line}");
+    let more = good.replace("*STEP\n", "*NODE\n500,3,3,3\n501,4,3,3\n502,5,3,3\n*ELEMENT,TYPE=SPRINGA,ELSET=S\n900,500,501,502\n*SPRING,ELSET=S\n1.\n*STEP\n");
+    let deck = parse(more.as_bytes(), Path::new("deck.inp"), Units::MetreNewton).unwrap();
+    assert!(deck.notes.iter().any(|n| n.contains("the first 2 are its own")), "{:?}", deck.notes);
     let noted = good.replace("*STEP\n", "*NSET,NSET=ASKED\n3,99\n*STEP\n");
     let deck = parse(noted.as_bytes(), Path::new("deck.inp"), Units::MetreNewton).unwrap();
     assert!(deck.notes.iter().any(|n| n.contains("node 99 is not defined")), "{:?}", deck.notes);
