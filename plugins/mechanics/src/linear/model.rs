@@ -117,7 +117,8 @@ impl Gap {
     fn force(&self, wider: f64) -> [f64; 2] {
         let closed = -wider - self.clearance;
         let at = closed * self.stiffness / (PI * self.pull);
-        let share = 0.5 + at.atan() / PI;
+        // ½ + atan(d/ε)/π to all digits where it is far open, too.
+        let share = 1f64.atan2(-at) / PI;
         let slope = share + at / (PI * (1.0 + at * at));
         [-self.stiffness * closed * share, self.stiffness * slope]
     }
