@@ -2,9 +2,9 @@
 //! one-dimensional and two-dimensional elements"). Every node of the deck becomes a ring of nodes:
 //! two or three along the normal of a shell, four or eight around the section of a beam. It moves
 //! as the mean of the outer ones, and turns as their mean rotation. Nodes between outer ones stay
-//! there where it is supported: of beams its angles, of shells its place. Where elements meet at an angle or with other
-//! sections, their rings there are one stiff knot. Sections that are no rectangle are one by where
-//! they are integrated.
+//! there where it is supported: of beams its angles, of shells its place. Where elements meet at an
+//! angle or with other sections, their rings there are one stiff knot. Sections that are no rectangle
+//! are one by where they are integrated.
 
 use std::{
     collections::{BTreeMap, HashMap},
