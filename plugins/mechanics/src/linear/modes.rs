@@ -25,7 +25,7 @@ const ENOUGH: usize = 600;
 /// Stiffness by mass that is added where parts can move freely, over the ratio of both traces.
 const SHIFT: f64 = 1e-6;
 /// By how much an eigenvalue of nothing may be below it, over that.
-const ROUNDING: f64 = 1e-7;
+const ROUNDING: f64 = 1e-6;
 
 /// Why there are no eigenvalues.
 #[derive(Debug)]
