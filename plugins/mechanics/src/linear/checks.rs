@@ -316,6 +316,13 @@ fn a_cantilever_bends_as_the_elastica() {
     near(end(&solved[1]).length(), 0.0, 1e-6);
 }
 
+/// What hardly strains is settled within rounding.
+#[test]
+fn small_loads_move_what_may_move_far() {
+    let deck = cube("*STEP,NLGEOM\n*STATIC\n*DLOAD\n1,P2,-2e-7\n*END STEP\n");
+    near(solve(&deck)[0].displacements.last().unwrap().x / 1e-9, 1.0, 1e-6);
+}
+
 /// A bar pulled beyond yield by forces, 1 % and a bit: bilinear as its table, then let go, which
 /// leaves what has flowed.
 #[test]
@@ -536,6 +543,18 @@ fn beams_that_meet_at_an_angle_turn_there_as_one() {
     let far = corner("SECTION=RECT\n.1,.1", "B32", ",NLGEOM", "5,3,1e-3");
     let there = DVec3::new(-0.028_206_37, -0.107_739_2, 0.502_464);
     near(far[4].distance(there), 0.0, 2e-6);
+}
+
+/// A plate on two hinges under its pressure, to where CalculiX 2.20 has it.
+#[test]
+fn hinges_of_shells_hold_their_middle() {
+    let deck = "*NODE\n1,0,0,0\n2,1,0,0\n3,1,1,0\n4,0,1,0\n5,.5,0,0\n6,1,.5,0\n7,.5,1,0\n8,0,.5,0\n\
+                *ELEMENT,TYPE=S8,ELSET=E\n1,1,2,3,4,5,6,7,8\n*MATERIAL,NAME=M\n*ELASTIC\n200.,.3\n\
+                *SHELL SECTION,ELSET=E,MATERIAL=M\n.2\n*BOUNDARY\n1,1,3\n4,1,3\n8,1,3\n2,3\n3,3\n6,3\n\
+                *STEP\n*STATIC\n*DLOAD\nE,P,1.\n*END STEP\n";
+    let moved = &solve(deck)[0].displacements;
+    near(moved[0].length(), 0.0, 1e-12);
+    near(moved[4].z, 0.067_5, 5e-8);
 }
 
 #[test]

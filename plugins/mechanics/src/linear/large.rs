@@ -25,6 +25,8 @@ use crate::{
 const STEPS: usize = 30;
 /// Change of a displacement that counts as none, over the largest before and after.
 const SETTLED: f64 = 1e-9;
+/// The same where no step is less than half the one before: rounding of what hardly strains.
+const STALLED: f64 = 1e-6;
 /// ‖f − K u‖ / ‖f‖ of every change.
 const TOLERANCE: f64 = 1e-6;
 /// The smallest part of a step.
@@ -179,7 +181,7 @@ pub(super) fn settled<'a>(
     job: &Job,
 ) -> Result<Option<Settled>, LinearError> {
     let largest = |all: &[f64]| all.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
-    let mut all = from.to_vec();
+    let (mut all, mut before) = (from.to_vec(), f64::INFINITY);
     for _ in 0..STEPS {
         let system = about(&all)?;
         let (matrix, mut rhs) = match system.assembled(job, |e, k, f| fill(&system, &all, e, k, f))
@@ -210,9 +212,11 @@ pub(super) fn settled<'a>(
         if !moved.is_finite() {
             return Ok(None);
         }
-        if moved <= SETTLED * largest(from).max(largest(&all)) {
+        let accuracy = if moved > 0.5 * before { STALLED } else { SETTLED };
+        if moved <= accuracy * largest(from).max(largest(&all)) {
             return Ok(Some(Settled { all, unstable: negative }));
         }
+        before = moved;
     }
     Ok(None)
 }

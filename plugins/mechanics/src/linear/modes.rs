@@ -23,9 +23,9 @@ const NOTHING: f64 = 1e-9;
 /// Vectors, beside eight for each eigenvalue, that are enough for all but what does not converge.
 const ENOUGH: usize = 600;
 /// Stiffness by mass that is added where parts can move freely, over the ratio of both traces.
-const SHIFT: f64 = 1e-9;
+const SHIFT: f64 = 1e-6;
 /// By how much an eigenvalue of nothing may be below it, over that.
-const ROUNDING: f64 = 1e-3;
+const ROUNDING: f64 = 1e-6;
 
 /// Why there are no eigenvalues.
 #[derive(Debug)]

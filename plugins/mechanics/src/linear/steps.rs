@@ -438,6 +438,9 @@ impl Reader {
             for node in self.some_nodes(target, row)? {
                 for component in first..=last {
                     let (at, unit) = self.motion(node, component, Some(state.step), row)?;
+                    if component < 3 {
+                        self.supported((node, component), state.step, row.line);
+                    }
                     let given = Given { value: value * unit, amplitude: amplitude.clone(), step };
                     if keeps {
                         state.held.remove(&at);

@@ -1,10 +1,10 @@
 //! Beams and shells made solid as CalculiX makes them (user's manual, "Expansion of the
 //! one-dimensional and two-dimensional elements"). Every node of the deck becomes a ring of nodes:
 //! two or three along the normal of a shell, four or eight around the section of a beam. It moves
-//! as the mean of the outer ones, and turns as their mean rotation; where its angles are supported,
-//! nodes between outer ones stay between them. Where elements meet at an angle or with other
-//! sections, their rings there are one stiff knot. Sections that are no rectangle are one by where
-//! they are integrated.
+//! as the mean of the outer ones, and turns as their mean rotation. Nodes between outer ones stay
+//! there where it is supported: of beams its angles, of shells its place. Where elements meet at an
+//! angle or with other sections, their rings there are one stiff knot. Sections that are no rectangle
+//! are one by where they are integrated.
 
 use std::{
     collections::{BTreeMap, HashMap},
@@ -70,8 +70,8 @@ struct Ring {
     outer: Vec<u32>,
     /// Others, and the two that each lies between.
     between: Vec<(u32, [u32; 2])>,
-    /// Whether nodes between the outer ones are kept there.
-    stiff: bool,
+    /// Components by which nodes between the outer ones are kept there.
+    stiff: [bool; 3],
 }
 
 /// Rings of all nodes of beams and shells.
@@ -373,14 +373,14 @@ impl Reader {
     ) -> Option<u32> {
         let number = *self.rings.alone.get(&node)?;
         let ring = self.rings.all[number].clone();
-        if let (Some(step), false) = (supported, ring.stiff) {
+        if let (Some(step), [false, ..], 4) = (supported, ring.stiff, ring.outer.len()) {
             for (middle, [a, b]) in &ring.between {
                 for i in 0..3 {
                     let terms = vec![(3 * middle + i, 1.0), (3 * a + i, -0.5), (3 * b + i, -0.5)];
                     self.deck.later.push((step, Equation { terms, value: 0.0, line: row.line }));
                 }
             }
-            self.rings.all[number].stiff = true;
+            self.rings.all[number].stiff = [true; 3];
         }
         if let Some(&turning) = self.turning.get(&node) {
             return Some(turning);
@@ -395,6 +395,20 @@ impl Reader {
         }
         self.turning.insert(node, turning);
         Some(turning)
+    }
+
+    /// What supports the corner of a quadratic shell supports its middle as well.
+    pub(super) fn supported(&mut self, (node, component): (u32, u8), step: u32, line: u32) {
+        let Some(&number) = self.rings.alone.get(&node) else { return };
+        let ring = &mut self.rings.all[number];
+        let &[(middle, _)] = ring.between.as_slice() else { return };
+        if std::mem::replace(&mut ring.stiff[usize::from(component)], true) {
+            return;
+        }
+        let own = self.deck.component(node, component);
+        let both = |&(u, f): &(u32, f64)| [(3 * middle + u % 3, f), (u, -f)];
+        let terms = own.iter().flat_map(both).collect();
+        self.deck.later.push((step, Equation { terms, value: 0.0, line }));
     }
 
     /// The solid that a beam or a shell becomes.
