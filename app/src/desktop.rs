@@ -223,6 +223,9 @@ impl eframe::App for Desktop {
     fn ui(&mut self, ui: &mut egui::Ui, _: &mut eframe::Frame) {
         let begin = Instant::now();
         self.window.show(ui);
+        // The window's name, for those who hear it.
+        let root = egui::accesskit_root_id();
+        ui.ctx().accesskit_node_builder(root, |root| root.set_label("Intrados"));
         // What was asked for is done at the beginning of the next frame, so there must be one.
         if !self.window.world().resource::<Actions>().is_empty() {
             ui.ctx().request_repaint();
