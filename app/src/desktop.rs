@@ -70,7 +70,11 @@ fn open(desktop: Desktop, size: [f32; 2], scale: f32) -> anyhow::Result<()> {
         .with_min_inner_size([640.0, 420.0])
         .with_icon(icon())
         .with_drag_and_drop(true);
-    let options = eframe::NativeOptions { viewport, ..Default::default() };
+    let system_font_fallback = finds_fonts();
+    if !system_font_fallback {
+        tracing::warn!("fontconfig is not installed: letters that the program lacks are left out");
+    }
+    let options = eframe::NativeOptions { viewport, system_font_fallback, ..Default::default() };
     // The theme follows the system: egui's default.
     eframe::run_native(
         "Intrados",
@@ -88,6 +92,18 @@ fn open(desktop: Desktop, size: [f32; 2], scale: f32) -> anyhow::Result<()> {
         }),
     )
     .map_err(|e| anyhow!("no window: {e}"))
+}
+
+/// Whether the system's fonts can be found: on Linux by a library that may be missing, and whoever
+/// asked it then would panic.
+#[cfg(any(target_os = "linux", target_os = "freebsd"))]
+fn finds_fonts() -> bool {
+    fontconfig_sys::statics::LIB_RESULT.is_ok()
+}
+
+#[cfg(not(any(target_os = "linux", target_os = "freebsd")))]
+fn finds_fonts() -> bool {
+    true
 }
 
 /// How far a picture is.
