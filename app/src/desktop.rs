@@ -70,7 +70,11 @@ fn open(desktop: Desktop, size: [f32; 2], scale: f32) -> anyhow::Result<()> {
         .with_min_inner_size([640.0, 420.0])
         .with_icon(icon())
         .with_drag_and_drop(true);
-    let options = eframe::NativeOptions { viewport, ..Default::default() };
+    let system_font_fallback = finds_fonts();
+    if !system_font_fallback {
+        tracing::warn!("fontconfig is not installed: letters that the program lacks are left out");
+    }
+    let options = eframe::NativeOptions { viewport, system_font_fallback, ..Default::default() };
     // The theme follows the system: egui's default.
     eframe::run_native(
         "Intrados",
@@ -88,6 +92,18 @@ fn open(desktop: Desktop, size: [f32; 2], scale: f32) -> anyhow::Result<()> {
         }),
     )
     .map_err(|e| anyhow!("no window: {e}"))
+}
+
+/// Whether the system's fonts can be found: on Linux by a library that may be missing, and whoever
+/// asked it then would panic.
+#[cfg(any(target_os = "linux", target_os = "freebsd"))]
+fn finds_fonts() -> bool {
+    fontconfig_sys::statics::LIB_RESULT.is_ok()
+}
+
+#[cfg(not(any(target_os = "linux", target_os = "freebsd")))]
+fn finds_fonts() -> bool {
+    true
 }
 
 /// How far a picture is.
@@ -223,6 +239,9 @@ impl eframe::App for Desktop {
     fn ui(&mut self, ui: &mut egui::Ui, _: &mut eframe::Frame) {
         let begin = Instant::now();
         self.window.show(ui);
+        // The window's name, for those who hear it.
+        let root = egui::accesskit_root_id();
+        ui.ctx().accesskit_node_builder(root, |root| root.set_label("Intrados"));
         // What was asked for is done at the beginning of the next frame, so there must be one.
         if !self.window.world().resource::<Actions>().is_empty() {
             ui.ctx().request_repaint();

@@ -1,6 +1,6 @@
 //! What the plots have in common.
 
-use egui::Ui;
+use egui::{Response, Role, Ui, WidgetInfo};
 use egui_plot::{GridInput, GridMark, HoverPosition, Plot, PlotPoint};
 
 use crate::number::significant;
@@ -34,6 +34,12 @@ pub(crate) fn plot<'a>(id: &str) -> Plot<'a> {
         .allow_zoom(false)
         .allow_boxed_zoom(false)
         .y_axis_min_width(40.0)
+}
+
+/// Lets what is written beside a plot be its name, for those who hear the window.
+pub(crate) fn named(plot: Response, by: &Response) {
+    plot.widget_info(|| WidgetInfo::new(Role::Image));
+    plot.labelled_by(by.id);
 }
 
 /// A plot of log₁₀ of something by log₁₀ of CPU-seconds.

@@ -6,7 +6,7 @@ use egui_plot::{HLine, Line, LineStyle, PlotPoints};
 
 use crate::{
     Refine, Statistics,
-    chart::{by_cpu_seconds, decades, key, place, plot, power},
+    chart::{by_cpu_seconds, decades, key, named, place, plot, power},
     colours,
     lang::local,
     number::significant,
@@ -34,8 +34,8 @@ fn errors(ui: &mut Ui, statistics: &Statistics, target: f64) {
             .collect();
         Line::new(name, PlotPoints::new(points)).color(colour).style(style).width(2.0)
     };
-    ui.horizontal(|ui| {
-        ui.label(tr!("Relative error of the picture's mean against CPU-seconds"));
+    let said = ui.horizontal(|ui| {
+        let said = ui.label(tr!("Relative error of the picture's mean against CPU-seconds"));
         for (name, colour, dashed) in [
             (tr!("primal"), colours::PRIMAL, false),
             (tr!("dual"), colours::DUAL, true),
@@ -43,8 +43,10 @@ fn errors(ui: &mut Ui, statistics: &Statistics, target: f64) {
         ] {
             key(ui, &name, colour, dashed);
         }
+        said
     });
-    by_cpu_seconds("errors").include_y(target.log10()).show(ui, |plot| {
+    let errors = by_cpu_seconds("errors").include_y(target.log10());
+    let shown = errors.show(ui, |plot| {
         plot.line(line(tr!("primal"), 0, colours::PRIMAL, LineStyle::Solid).width(4.0));
         plot.line(line(tr!("dual"), 1, colours::DUAL, LineStyle::dashed_loose()));
         plot.line(line(tr!("combined"), 2, colours::COMBINED, LineStyle::Solid));
@@ -54,14 +56,15 @@ fn errors(ui: &mut Ui, statistics: &Statistics, target: f64) {
                 .style(LineStyle::dotted_dense()),
         );
     });
+    named(shown.response, &said.inner);
 }
 
 /// The duality gap in standard errors: N(0,1) if both sides are right.
 fn gap(ui: &mut Ui, statistics: &Statistics) {
     let points: Vec<[f64; 2]> =
         statistics.history().iter().filter_map(|e| Some([e.cpu_seconds.log10(), e.z?])).collect();
-    ui.label(tr!("Duality gap against CPU-seconds, in standard errors (dotted: 95 %)"));
-    plot("gap")
+    let said = ui.label(tr!("Duality gap against CPU-seconds, in standard errors (dotted: 95 %)"));
+    let gap = plot("gap")
         .x_grid_spacer(decades)
         .x_axis_formatter(|mark, _| power(mark))
         .include_y(-3.0)
@@ -70,17 +73,18 @@ fn gap(ui: &mut Ui, statistics: &Statistics) {
             let p = place(hover);
             let gap = local(format!("{:+.2}", p.y));
             Some(tr!("{} σ after {} CPU-s", gap, significant(10_f64.powf(p.x), 2)))
-        })
-        .show(ui, |plot| {
-            for z in [-2.0, 2.0] {
-                plot.hline(
-                    HLine::new("95 %", z).color(colours::UNKNOWN).style(LineStyle::dotted_dense()),
-                );
-            }
-            plot.line(
-                Line::new(tr!("primal − dual"), PlotPoints::new(points))
-                    .color(colours::PRIMAL)
-                    .width(2.0),
-            );
         });
+    let shown = gap.show(ui, |plot| {
+        for z in [-2.0, 2.0] {
+            plot.hline(
+                HLine::new("95 %", z).color(colours::UNKNOWN).style(LineStyle::dotted_dense()),
+            );
+        }
+        plot.line(
+            Line::new(tr!("primal − dual"), PlotPoints::new(points))
+                .color(colours::PRIMAL)
+                .width(2.0),
+        );
+    });
+    named(shown.response, &said);
 }

@@ -142,8 +142,9 @@ fn row(ui: &mut Ui, job: &Job) {
     if ui.button(tr!("Cancel")).on_hover_text(hint).clicked() {
         job.cancel();
     }
-    ui.add(ProgressBar::new(job.done()).desired_width(160.0).show_percentage());
-    ui.label(label);
+    let bar = ui.add(ProgressBar::new(job.done()).desired_width(160.0).show_percentage());
+    let label = ui.label(label);
+    bar.labelled_by(label.id);
 }
 
 #[cfg(test)]

@@ -70,6 +70,7 @@ fn open_row(ui: &mut Ui, path: &mut String, dialog_is_open: bool, actions: &mut 
         ui.label(tr!("or drop a .ron, .glb, .gltf or .ifc file here, or its path:"));
         let field = egui::TextEdit::singleline(path).desired_width(240.0);
         let field = ui.add(field.hint_text(tr!("path of a file")));
+        let field = field.on_hover_text(tr!("path of a file"));
         let entered = field.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter));
         let go = ui.add_enabled(!path.trim().is_empty(), Button::new(tr!("Open path")));
         if (entered || go.clicked()) && !path.trim().is_empty() {

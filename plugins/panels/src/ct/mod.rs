@@ -372,11 +372,12 @@ fn tools(ui: &mut Ui, ct: &mut Ct, sources: &[(String, Source)], has_sinogram: b
         response.response.labelled_by(label.id);
         ct.method = Some(method);
         let combo = ComboBox::from_id_salt("ct overlay").selected_text(ct.overlay.name());
-        combo.width(100.0).show_ui(ui, |ui| {
+        let shown = combo.width(100.0).show_ui(ui, |ui| {
             for overlay in Overlay::ALL {
                 ui.selectable_value(&mut ct.overlay, overlay, overlay.name());
             }
         });
+        shown.response.on_hover_text(tr!("What is drawn over the slice"));
         ui.separator();
         ct.probe.tools(ui);
         ui.separator();
@@ -473,7 +474,8 @@ fn aside(
             if ui.small_button(tr!("⏹ Stop reading")).clicked() {
                 task.job().cancel();
             }
-            ui.add(egui::ProgressBar::new(task.job().done()).desired_width(120.0));
+            let bar = egui::ProgressBar::new(task.job().done()).desired_width(120.0);
+            ui.add(bar).on_hover_text(term(&task.job().label()));
         } else if unread > 0 && ui.button(tr!("Read the other {} slices", unread)).clicked() {
             let (told, scene, method, shelf) =
                 (Arc::clone(&profile.told), Arc::clone(scene), method, shelf.clone());

@@ -7,7 +7,7 @@ use intrados_stage::Estimate;
 
 use super::source::Read;
 use crate::{
-    chart::{key, place, plot},
+    chart::{key, named, place, plot},
     colours,
     lang::{fixed, term},
     number::{percent, significant},
@@ -15,11 +15,12 @@ use crate::{
 
 /// Grey of the body's pixels, with the window over it.
 pub(super) fn histogram(ui: &mut Ui, read: &Read, window: [f32; 2], height: f32) {
-    ui.horizontal(|ui| {
-        ui.strong(tr!("Histogram"))
-            .on_hover_text(tr!("Share of the body's pixels by grey (root scale); \
-             the lines are what is shown black and white"));
+    let hint = tr!("Share of the body's pixels by grey (root scale); \
+         the lines are what is shown black and white");
+    let said = ui.horizontal(|ui| {
+        let said = ui.strong(tr!("Histogram")).on_hover_text(hint);
         ui.weak(tr!("of the body's grey"));
+        said
     });
     let [low, high] = read.range.map(f64::from);
     let width = (high - low) / read.histogram.len().max(1) as f64;
@@ -37,12 +38,13 @@ pub(super) fn histogram(ui: &mut Ui, read: &Read, window: [f32; 2], height: f32)
             let p = place(hover);
             Some(tr!("grey {}", significant(p.x, 3)))
         });
-    chart.show(ui, |chart| {
+    let shown = chart.show(ui, |chart| {
         chart.line(Line::new(tr!("share"), steps).color(colours::PRIMAL).width(1.5).fill(0.0));
         for (name, at) in [tr!("black"), tr!("white")].into_iter().zip(window) {
             chart.vline(VLine::new(name, f64::from(at)).color(colours::SELECTED).width(1.5));
         }
     });
+    named(shown.response, &said.inner);
 }
 
 /// Porosity of the slices that have been read, ± one standard error. A click asks for the slice
@@ -54,13 +56,14 @@ pub(super) fn profile(
     now: usize,
     height: f32,
 ) -> Option<usize> {
-    ui.horizontal(|ui| {
-        ui.strong(tr!("Porosity along the axis"))
-            .on_hover_text(tr!("Of the slices that have been read, ± standard error of reading; \
-             a click goes to the slice"));
+    let hint = tr!("Of the slices that have been read, ± standard error of reading; \
+         a click goes to the slice");
+    let said = ui.horizontal(|ui| {
+        let said = ui.strong(tr!("Porosity along the axis")).on_hover_text(hint);
         if truth.is_some() {
             key(ui, &tr!("planted here"), colours::COMBINED, false);
         }
+        said
     });
     let known =
         || along.iter().enumerate().filter_map(|(k, r)| Some((k as f64 + 1.0, r.as_ref()?)));
@@ -105,7 +108,9 @@ pub(super) fn profile(
         }
         chart.pointer_coordinate()
     });
-    let at = shown.inner.filter(|_| shown.response.clicked())?;
+    let at = shown.inner.filter(|_| shown.response.clicked());
+    named(shown.response, &said.inner);
+    let at = at?;
     (!along.is_empty()).then(|| (at.x.round().max(1.0) as usize).min(along.len()) - 1)
 }
 

@@ -278,7 +278,8 @@ fn choose(ui: &mut Ui, photos: &mut Photos, scene: &Scene, member: &Member, acti
         let field = egui::TextEdit::singleline(&mut photos.path)
             .desired_width(180.0)
             .hint_text(tr!("path of a photograph"));
-        let entered = ui.add(field).lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter));
+        let field = ui.add(field).on_hover_text(tr!("path of a photograph"));
+        let entered = field.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter));
         let can = !photos.path.trim().is_empty();
         let go = ui.add_enabled(can, egui::Button::new(tr!("Open photograph")));
         if can && (entered || go.clicked()) {
@@ -305,12 +306,14 @@ fn faces(ui: &mut Ui, photos: &mut Photos) {
     ui.separator();
     let before = *face;
     let combo = ComboBox::from_id_salt("photo face").selected_text(name(*face)).width(110.0);
-    combo.show_ui(ui, |ui| {
+    let shown = combo.show_ui(ui, |ui| {
         ui.selectable_value(face, None, name(None));
         for k in 0..shot.faces.len() {
             ui.selectable_value(face, Some(k), name(Some(k)));
         }
     });
+    let hint = tr!("The photograph, or one of the faces that it shows, laid flat");
+    shown.response.on_hover_text(hint);
     if *face != before {
         photos.zoom = Zoom::default();
     }
@@ -428,7 +431,8 @@ fn aside(
             if ui.small_button(tr!("⏹ Stop reading")).clicked() {
                 task.job().cancel();
             }
-            ui.add(egui::ProgressBar::new(task.job().done()).desired_width(110.0));
+            let bar = egui::ProgressBar::new(task.job().done()).desired_width(110.0);
+            ui.add(bar).on_hover_text(term(&task.job().label()));
         } else if ui
             .add_enabled(is_placed, egui::Button::new(tr!("Read it")))
             .on_hover_text(tr!(

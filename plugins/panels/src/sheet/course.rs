@@ -19,7 +19,7 @@ pub(super) fn plot(ui: &mut Ui, course: &Course, moment: Moment) {
     let points: Vec<[f64; 2]> = course.passed().iter().map(|(y, z)| [*y, worst(z)]).collect();
     let ink = ui.visuals().text_color();
     let width = ui.available_width().min(420.0);
-    chart::plot("course")
+    let plot = chart::plot("course")
         .height(HEIGHT)
         .width(width)
         .include_y(0.0)
@@ -30,13 +30,14 @@ pub(super) fn plot(ui: &mut Ui, course: &Course, moment: Moment) {
         .label_formatter(|hover| {
             let at = chart::place(hover);
             Some(tr!("in {} years: d = {}", fixed(at.x, 1), fixed(at.y, 2)))
-        })
-        .show(ui, |plot| {
-            plot.line(Line::new("d", PlotPoints::from(points)).color(ink).width(2.0));
-            plot.vline(VLine::new("now", 0.0).color(Color32::GRAY));
-            if !moment.is_now() {
-                plot.vline(VLine::new("then", moment.years).color(ink));
-            }
         });
-    ui.weak(tr!("d of the worst zone by its life, over years from now"));
+    let shown = plot.show(ui, |plot| {
+        plot.line(Line::new("d", PlotPoints::from(points)).color(ink).width(2.0));
+        plot.vline(VLine::new("now", 0.0).color(Color32::GRAY));
+        if !moment.is_now() {
+            plot.vline(VLine::new("then", moment.years).color(ink));
+        }
+    });
+    let said = ui.weak(tr!("d of the worst zone by its life, over years from now"));
+    chart::named(shown.response, &said);
 }

@@ -395,11 +395,12 @@ fn controls(ui: &mut Ui, stress: &mut Stress, skin: &Skin, auto: f32, ranges: &m
         let combo = ComboBox::from_id_salt("stress quantity")
             .width(190.0)
             .selected_text(stress.quantity.name(skin));
-        combo.show_ui(ui, |ui| {
+        let shown = combo.show_ui(ui, |ui| {
             for quantity in Quantity::all() {
                 ui.selectable_value(&mut stress.quantity, quantity, quantity.name(skin));
             }
         });
+        shown.response.on_hover_text(tr!("What is shown on the member"));
         let label = ui.label(tr!("Deformation ×"));
         let mut scale = stress.scale.unwrap_or(auto);
         let slider = slide(&mut scale, 0.0..=(20.0 * auto).max(100.0))

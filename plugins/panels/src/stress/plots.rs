@@ -9,7 +9,7 @@ use intrados_mechanics::{
 use intrados_stage::time::DAY;
 
 use crate::{
-    chart::{key, place, plot},
+    chart::{key, named, place, plot},
     colours,
     lang::fixed,
     number::significant,
@@ -31,10 +31,11 @@ pub(super) fn show(ui: &mut Ui, skin: &Skin, shot: &Snapshot, analysis: &Analysi
 
 /// Force along each tendon, and at the jack.
 fn tendons(ui: &mut Ui, skin: &Skin, shot: &Snapshot, height: f32) {
-    ui.horizontal(|ui| {
-        ui.strong(tr!("Tendon force, kN"))
-            .on_hover_text(tr!("Along the tendon from its first end, m"));
+    let said = ui.horizontal(|ui| {
+        let said = ui.strong(tr!("Tendon force, kN"));
+        let said = said.on_hover_text(tr!("Along the tendon from its first end, m"));
         ui.weak(tr!("{} tendons", skin.tendons.len())).on_hover_text(tr!("Dashed: at the jack"));
+        said
     });
     let chart =
         plot("tendon forces").height(height).x_axis_label("m").include_y(0.0).label_formatter(
@@ -43,7 +44,7 @@ fn tendons(ui: &mut Ui, skin: &Skin, shot: &Snapshot, height: f32) {
                 Some(tr!("{} kN at {} m", significant(p.y, 4), fixed(p.x, 2)))
             },
         );
-    chart.show(ui, |chart| {
+    let shown = chart.show(ui, |chart| {
         for (i, (tendon, forces)) in skin.tendons.iter().zip(&shot.tendons).enumerate() {
             let colour = TURN[i % TURN.len()];
             let points: PlotPoints<'_> =
@@ -61,6 +62,7 @@ fn tendons(ui: &mut Ui, skin: &Skin, shot: &Snapshot, height: f32) {
             );
         }
     });
+    named(shown.response, &said.inner);
 }
 
 /// Largest displacement and widest crack over time.
