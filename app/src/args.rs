@@ -855,7 +855,8 @@ pub(crate) struct Analyze {
     /// the gradient, which has no planes, if absent
     #[arg(long, value_name = "LAW")]
     pub(crate) crack_law: Option<CrackLaw>,
-    /// Folder for VTU, PVD, CSV and JSON; nothing is written if absent
+    /// Folder for VTU, PVD, CSV and JSON, what an interrupted run has reached in its folder
+    /// `stopped`; nothing is written if absent
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
 }
