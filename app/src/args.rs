@@ -36,7 +36,8 @@ Exit codes: 0 done, 1 internal error or a failed check, 2 wrong usage, 3 target 
 73 cannot write, 75 a unit of a campaign that is to be started again, 130 interrupted.
 
 Interrupted by Ctrl-C or SIGTERM, render and measure write what they have reached and mark it; predict, scan, analyze and experiment table-3-1
-(with --out) keep their finished parts in that folder, killed ones too, and the same command goes on from them. A second signal ends at once.
+(with --out) keep their finished parts in that folder, killed ones too, and the same command goes on from them; what analyze has reached besides is
+in the folder `stopped` within it. A second signal ends at once.
 The files of a run come to their folder all at once, the JSON that lists them last: a list that is there names files of one run.
 
 Examples:
@@ -137,7 +138,7 @@ pub(crate) enum Command {
     /// Computes stress, creep and damage of members over their load history, or runs an Abaqus or
     /// CalculiX deck or a Gmsh mesh
     #[command(
-        after_help = "Examples:\n  intrados analyze column --out stress\n  intrados analyze tunnel --member T1 --element 0.3 --format json\n  intrados analyze beam --member B1 --fine 0.4..0.6 --out stress\n  intrados analyze bracket.inp --units mm,N --out stress\n  intrados analyze wall.msh --units m,N --groups wall.groups.ron --out stress\n\nWhat the physical groups of a mesh are is said in a file such as\n  (schema: \"intrados.groups/1\",\n   materials: [(group: \"core\", modulus_gpa: 33, poisson: 0.2, density_kg_m3: 2500, expansion_1e6_k: 10)],\n   supports: [(group: \"foot\", x: true, y: true, z: true), (group: \"side\", x: true, moved_mm: (0.5, 0, 0))],\n   loads: [(action: Weight(gravity_m_s2: (0, 0, -9.81))),\n           (group: \"top\", action: Pressure(pressure_kpa: 100)),\n           (group: \"top\", action: Traction(traction_kpa: (20, 0, 0))),\n           (group: \"rim\", action: Force(force_kn: (0, 0, -10))),\n           (group: \"core\", action: Temperature(uniform_k: 15))])\nMaterials, weight and temperature without a group are those of all solids.\n\nWhat it does not do: bars and tendons of glTF members are used only where their nodes say how they run, as those of `intrados import` do (else it is plain concrete, with a warning); displacements are taken as small (near or beyond the load of buckling it warns or ends); a Gmsh mesh is of solids, linear elastic, in one step; bricks that grow in layers are in the library and no scene asks for them."
+        after_help = "Examples:\n  intrados analyze column --out stress\n  intrados analyze tunnel --member T1 --element 0.3 --format json\n  intrados analyze beam --member B1 --fine 0.4..0.6 --out stress\n  intrados analyze beam --member B1 --to-failure --out strength\n  intrados analyze bracket.inp --units mm,N --out stress\n  intrados analyze wall.msh --units m,N --groups wall.groups.ron --out stress\n\nWhat the physical groups of a mesh are is said in a file such as\n  (schema: \"intrados.groups/1\",\n   materials: [(group: \"core\", modulus_gpa: 33, poisson: 0.2, density_kg_m3: 2500, expansion_1e6_k: 10)],\n   supports: [(group: \"foot\", x: true, y: true, z: true), (group: \"side\", x: true, moved_mm: (0.5, 0, 0))],\n   loads: [(action: Weight(gravity_m_s2: (0, 0, -9.81))),\n           (group: \"top\", action: Pressure(pressure_kpa: 100)),\n           (group: \"top\", action: Traction(traction_kpa: (20, 0, 0))),\n           (group: \"rim\", action: Force(force_kn: (0, 0, -10))),\n           (group: \"core\", action: Temperature(uniform_k: 15))])\nMaterials, weight and temperature without a group are those of all solids.\n\nWhat it does not do: bars and tendons of glTF members are used only where their nodes say how they run, as those of `intrados import` do (else it is plain concrete, with a warning); members are followed in second order where it counts, and end where loads exceed those of buckling or parts have moved by a twentieth of the length; a Gmsh mesh is of solids, linear elastic, in one step."
     )]
     Analyze(Analyze),
     /// Scans members with X-rays: projections, reconstructed slices, and the truth beside them; or
@@ -855,8 +856,7 @@ pub(crate) struct Analyze {
     /// the gradient, which has no planes, if absent
     #[arg(long, value_name = "LAW")]
     pub(crate) crack_law: Option<CrackLaw>,
-    /// Folder for VTU, PVD, CSV and JSON, what an interrupted run has reached in its folder
-    /// `stopped`; nothing is written if absent
+    /// Folder for VTU, PVD, CSV and JSON; nothing is written if absent
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
 }
