@@ -281,6 +281,42 @@ fn an_interrupted_picture_and_reading_are_kept() {
     );
 }
 
+/// The steps of a life that was interrupted are there, apart and named as what they are, with those
+/// that were whole; and the same command goes on to the result.
+#[test]
+fn an_interrupted_life_is_kept_until_then() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let args = ["analyze", "column", "--member", "C1", "--element", "0.2", "--out", text(&out)];
+    let mut child =
+        program().args(args).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+    let drawn = || {
+        let entries =
+            |folder: &Path| fs::read_dir(folder).into_iter().flatten().flatten().map(|e| e.path());
+        entries(&out).flat_map(|aside| entries(&aside)).any(|p| p.ends_with("C1_0002.vtu"))
+    };
+    wait_for(&mut child, drawn);
+    assert!(
+        Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success()
+    );
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(130), "{}", stderr(&output));
+    assert!(stderr(&output).contains("interrupted: what was reached is in"), "{}", stderr(&output));
+    assert!(!out.join("analyze.json").exists() && entries(&out) == 1);
+    let report = read(&out.join("stopped/analyze.json"));
+    let life = &report["models"][0];
+    assert!(report["stopped"] == true && life["stopped"] == true, "{life}");
+    let complaint = life["complaint"].as_str().unwrap();
+    assert!(complaint.starts_with("it was stopped on day "), "{complaint}");
+    let steps = life["steps"].as_array().unwrap().len();
+    let pictures = files(&report).iter().filter(|f| f.extension().unwrap() == "vtu").count();
+    assert!(steps >= 3 && pictures == steps, "{pictures} pictures of {steps} steps");
+    let table = fs::read_to_string(out.join("stopped/C1.csv")).unwrap();
+    assert!(table.ends_with(&format!("\n# {complaint}\n")), "{table}");
+    let whole = json(&args);
+    assert!(whole["stopped"].is_null() && files(&whole).len() > files(&report).len());
+}
+
 /// The finished places of a scan that was broken off, by a signal or without a word, are taken up
 /// by the same command: the result has the bits of one that ran through.
 #[test]

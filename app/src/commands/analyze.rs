@@ -7,7 +7,10 @@ use std::{
 };
 
 use intrados_mechanics::{
-    analysis::{GaugeOutcome, MemberOutcome, Moment, Outcome as Life, Pictures, analyze},
+    analysis::{
+        GaugeOutcome, MemberOutcome, Moment, Outcome as Life, Pictures, analyze,
+        analyze_until_stopped,
+    },
     deck::Case,
     frame::Whole,
     linear::{Groups, concerns, parse, parse_mesh},
@@ -37,6 +40,11 @@ use crate::{
 
 /// Pa in a megapascal.
 const MPA: f64 = 1e6;
+/// The file that names the others.
+const LIST: &str = "analyze.json";
+/// Folder, within that of the results, of what there is where somebody stops it.
+const STOPPED: &str = "stopped";
+
 /// All members. Schema `intrados.analyze/1`.
 #[derive(Debug, Serialize)]
 struct Report {
@@ -58,6 +66,9 @@ struct Report {
     /// All members as one, where that was asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     whole: Option<Whole>,
+    /// Whether somebody stopped it: then it is not all.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    stopped: bool,
     files: Vec<String>,
 }
 
@@ -115,7 +126,7 @@ pub(crate) fn run(session: &Session, args: &args::Analyze) -> Result<Outcome, Fa
                 .map_err(|why| refused(args, prepared, why))
         });
         let lives = lives.collect::<Result<Vec<_>, _>>()?;
-        return told(session, &Report::new(work, lives, cpu_seconds() - begin));
+        return told(session, &Report::new(&work, lives, cpu_seconds() - begin));
     };
     let key = (
         &work.hash,
@@ -131,11 +142,7 @@ pub(crate) fn run(session: &Session, args: &args::Analyze) -> Result<Outcome, Fa
         args.units.map(|u| format!("{u:?}")),
     );
     let (mut files, lives) = output::in_parts(session, out, &key, |files| {
-        let lives = work.prepared.iter().enumerate().map(|(i, prepared)| {
-            let _progress = session.watch(work.label(i));
-            files.part(&prepared.id, |files| drawn_life(session, args, &work, prepared, files))
-        });
-        lives.collect::<Result<Vec<_>, Failure>>()
+        drawn_lives(session, args, &work, files, begin)
     })?;
     let (lives, damage): (Vec<Life>, Vec<Vec<SurfaceDamage>>) = lives.into_iter().unzip();
     // For `render --cracks` and `scan --cracks`; a deck is no scene that either could take.
@@ -143,8 +150,7 @@ pub(crate) fn run(session: &Session, args: &args::Analyze) -> Result<Outcome, Fa
         let surface = SurfaceFile::new(&work.hash, damage.into_iter().flatten().collect());
         files.write("cracks.json", output::json(&surface)?.as_bytes())?;
     }
-    const LIST: &str = "analyze.json";
-    let mut report = Report::new(work, lives, cpu_seconds() - begin);
+    let mut report = Report::new(&work, lives, cpu_seconds() - begin);
     report.files = files.listed(LIST);
     files.finish(LIST, &report)?;
     told(session, &report)
@@ -172,7 +178,6 @@ fn as_one(session: &Session, args: &args::Analyze) -> Result<Outcome, Failure> {
         ..Report::default()
     };
     if let Some(out) = &args.out {
-        const LIST: &str = "analyze.json";
         let mut files = output::begin(out)?;
         files.write("end_forces.csv", found.csv().as_bytes())?;
         let [bars, plates] = ["whole_bars.vtu", "whole_plates.vtu"].map(|name| files.place(name));
@@ -466,6 +471,55 @@ fn mesh(args: &args::Analyze, units: Units, bytes: &[u8], name: String) -> Resul
     Ok(Read::Linear(Box::new(linear::Read { deck, name, hash: hash.to_hex().to_string() })))
 }
 
+/// All lives with their files; where they are stopped, what there is until then is published.
+fn drawn_lives(
+    session: &Session,
+    args: &args::Analyze,
+    work: &Work,
+    files: &mut Set,
+    begin: f64,
+) -> Result<Vec<(Life, Vec<SurfaceDamage>)>, Failure> {
+    let (mut lives, mut stopped) = (Vec::new(), None);
+    for (i, prepared) in work.prepared.iter().enumerate() {
+        let progress = session.watch(work.label(i));
+        let life = files.part(&prepared.id, |files| {
+            let (life, damage) = drawn_life(session, args, work, prepared, files)?;
+            if life.stopped {
+                stopped = Some(life);
+                return Err(Failure::Interrupted);
+            }
+            Ok((life, damage))
+        });
+        drop(progress);
+        match life {
+            Ok(life) => lives.push(life),
+            Err(Failure::Interrupted) => {
+                let lives = lives.into_iter().map(|(life, _)| life).chain(stopped).collect();
+                keep_so_far(session, files, Report::new(work, lives, cpu_seconds() - begin))?;
+                return Err(Failure::Interrupted);
+            }
+            Err(other) => return Err(other),
+        }
+    }
+    Ok(lives)
+}
+
+/// Publishes what there is of lives that were stopped, in a folder of its own: the result, to which
+/// the same command goes on, is whole or not there.
+fn keep_so_far(session: &Session, files: &Set, mut report: Report) -> Result<(), Failure> {
+    if report.models.is_empty() || session.is_embedded() {
+        return Ok(());
+    }
+    let folder = files.folder().join(STOPPED);
+    let mut so_far = output::begin(&folder)?;
+    files.copy_into(&mut so_far).map_err(|e| Failure::cannot_write(&folder, e))?;
+    report.stopped = true;
+    report.files = so_far.listed(LIST);
+    so_far.finish(LIST, &report)?;
+    session.note(format_args!("interrupted: what was reached is in {}", folder.display()));
+    Ok(())
+}
+
 /// A life with its files, and what is seen of it from outside.
 fn drawn_life(
     session: &Session,
@@ -478,9 +532,9 @@ fn drawn_life(
     let series = files.place(format!("{name}.pvd"));
     let mut pictures = Pictures::new(series, prepared.axis, &work.hash);
     let mut looking = Looking::new(prepared, Seen::default());
-    let (life, _) =
-        analyze(prepared, work.settings(args), &session.job, &mut (&mut pictures, &mut looking))
-            .map_err(|why| refused(args, prepared, why))?;
+    let mut both = (&mut pictures, &mut looking);
+    let (life, _) = analyze_until_stopped(prepared, work.settings(args), &session.job, &mut both)
+        .map_err(|why| refused(args, prepared, why))?;
     let folder = files.folder().to_owned();
     let cannot = |e| not_written(&folder, e);
     life.write_steps(&files.place(format!("{name}.csv"))).map_err(cannot)?;
@@ -530,18 +584,19 @@ impl Default for Report {
             gauges: Vec::new(),
             models: Vec::new(),
             whole: None,
+            stopped: false,
             files: Vec::new(),
         }
     }
 }
 
 impl Report {
-    fn new(work: Work, models: Vec<Life>, cpu_seconds: f64) -> Self {
+    fn new(work: &Work, models: Vec<Life>, cpu_seconds: f64) -> Self {
         let longest =
             models.iter().max_by(|a, b| a.steps.len().cmp(&b.steps.len())).map(|m| m.steps.clone());
         Self {
-            scene: work.name,
-            scene_hash: work.hash,
+            scene: work.name.clone(),
+            scene_hash: work.hash.clone(),
             dof: models.iter().map(|m| m.dof).sum(),
             elements: models.iter().map(|m| m.elements).sum(),
             solver: "auto (direct below 6000 unknowns, else multigrid)",
@@ -686,10 +741,7 @@ impl From<MemberError> for Failure {
 impl From<model::Failure> for Failure {
     fn from(error: model::Failure) -> Self {
         match error {
-            model::Failure::Cancelled(_)
-            | model::Failure::Solve(intrados_mechanics::sparse::SolveError::Cancelled(_)) => {
-                Self::Interrupted
-            }
+            why if why.is_cancelled() => Self::Interrupted,
             other => Self::BadInput(other.to_string()),
         }
     }

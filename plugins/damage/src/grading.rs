@@ -47,7 +47,8 @@ pub struct Profile {
     #[serde(default)]
     pub forecast_error: f64,
     /// Whether a member's damage is the share of its strength that what is known of it costs, as it
-    /// is computed by finite elements, and not that of its worst zone by the rule.
+    /// is computed by finite elements, and not that of its worst zone by the rule. Where that
+    /// is not computed its worst zone counts, and the limits of a prediction say so.
     #[serde(default)]
     pub by_strength: bool,
     /// Crack widths that are admitted, by exposure.

@@ -7,7 +7,7 @@ use std::{
 
 use glam::DVec3;
 use intrados_scene::MemberKind;
-use intrados_stage::{Job, file::WriteError};
+use intrados_stage::{Cancelled, Job, file::WriteError, time::DAY};
 use serde::{Deserialize, Serialize};
 
 use crate::{
@@ -20,7 +20,7 @@ use crate::{
     },
     strength::{self, CurvePoint, Strength},
     tensor::{Principal, Voigt, rotate_stress},
-    write::{self, Curve, Field, Grid, Series, csv},
+    write::{self, Curve, Field, Grid, Series, noted_csv},
 };
 
 pub(crate) use crate::limits::Stability;
@@ -48,6 +48,9 @@ pub struct Outcome {
     pub tolerance: f64,
     /// Why it ended early; empty if it did not.
     pub complaint: String,
+    /// Whether somebody stopped it: then it is not all of it.
+    #[serde(default)]
+    pub stopped: bool,
     /// How near its loads came to buckling; none: nothing is pressed, or nobody could tell.
     pub stability: Option<Stability>,
     /// What it bears, where loads are raised after its life.
@@ -218,6 +221,20 @@ pub fn analyze(
     job: &Job,
     observer: &mut impl Observer,
 ) -> Result<(Outcome, History), Failure> {
+    let found = analyze_until_stopped(prepared, settings, job, observer)?;
+    if found.0.stopped { Err(Cancelled.into()) } else { Ok(found) }
+}
+
+/// The same, but where the job is cancelled, what there is until then: [`Outcome::stopped`].
+///
+/// # Errors
+/// As of [`analyze`]; [`Failure::Cancelled`] before the first equilibrium.
+pub fn analyze_until_stopped(
+    prepared: &Prepared,
+    settings: MarchSettings,
+    job: &Job,
+    observer: &mut impl Observer,
+) -> Result<(Outcome, History), Failure> {
     let model = &prepared.model;
     let structure = System::new(model)?;
     let pieces: usize = model.steel.iter().map(|s| s.pieces.len()).sum();
@@ -236,6 +253,7 @@ pub fn analyze(
         cracks: model.cracking(),
         tolerance: settings.tolerance,
         complaint: String::new(),
+        stopped: false,
         stability: None,
         strength: None,
         warnings: prepared.warnings.clone(),
@@ -246,14 +264,16 @@ pub fn analyze(
     let last = prepared.times.last().copied().unwrap_or(prepared.begin);
     // A first moment at the beginning is a step of no duration: what is there takes its loads.
     for (i, &time) in prepared.times.iter().enumerate() {
-        job.step(i, prepared.times.len())?;
         let result = loop {
-            let result = march.advance(time, 0.0, job, |history, step| {
-                let points = structure.all_points(history)?;
-                limits.see(&structure, history, step, &points, step.time >= last, job)?;
-                outcome.take(prepared, history, step, &points);
-                steel.take(&structure, history)?;
-                observer.see(&structure, history, step, &points)
+            let goes_on = job.step(i, prepared.times.len()).map_err(Failure::from);
+            let result = goes_on.and_then(|()| {
+                march.advance(time, 0.0, job, |history, step| {
+                    let points = structure.all_points(history)?;
+                    limits.see(&structure, history, step, &points, step.time >= last, job)?;
+                    outcome.take(prepared, history, step, &points);
+                    steel.take(&structure, history)?;
+                    observer.see(&structure, history, step, &points)
+                })
             });
             if result.is_err() || march.history.turned || !limits.needs_second_order() {
                 break result;
@@ -263,6 +283,10 @@ pub fn analyze(
         };
         match result {
             Ok(()) => {}
+            Err(why) if why.is_cancelled() && !outcome.steps.is_empty() => {
+                outcome.stop(&format!("on day {:.0} of its life", march.history.time / DAY));
+                break;
+            }
             Err(Failure::Beyond(why)) => {
                 outcome.end(
                     prepared,
@@ -298,6 +322,9 @@ pub fn analyze(
         let settings = strength::settings(settings);
         let (found, end) =
             strength::raise(&structure, prepared, raised, start, settings, job, each)?;
+        if found.stopped {
+            outcome.stop("while its loads were raised");
+        }
         (outcome.strength, march.history) = (Some(found), end);
     }
     let (warnings, notes) = limits.told();
@@ -376,6 +403,11 @@ impl MemberOutcome {
 }
 
 impl Outcome {
+    fn stop(&mut self, when: &str) {
+        self.stopped = true;
+        self.complaint = format!("it was stopped {when}");
+    }
+
     /// Its last entry is one that is no equilibrium.
     fn end(&mut self, prepared: &Prepared, why: String, time: f64, displacement: f64) {
         self.complaint = why;
@@ -649,14 +681,15 @@ impl Observer for Pictures {
 }
 
 impl Strength {
-    /// Writes its curve as a table.
+    /// Writes its curve as a table; where it was stopped, the last line says so.
     ///
     /// # Errors
-    /// As [`csv`].
+    /// As [`write::csv`].
     pub fn write_curve(&self, path: &Path) -> Result<(), WriteError> {
         let row = |p: &CurvePoint| [p.displacement_m, p.load_factor, p.load_n, p.residual];
         let rows: Vec<[f64; 4]> = self.curve.iter().map(row).collect();
-        csv(path, &["displacement_m", "load_factor", "load_n", "residual"], &rows)
+        let note = if self.stopped { self.ended.as_str() } else { "" };
+        noted_csv(path, &["displacement_m", "load_factor", "load_n", "residual"], &rows, note)
     }
 
     /// Draws its curve.
@@ -674,16 +707,21 @@ impl Strength {
         };
         let mut curves = vec![curve("load", &self.curve, false)];
         curves.extend(self.yielding.map(|y| curve("a bar yields", &[y], true)));
-        curves.push(curve(&format!("peak: {}", self.mode.words()), &[self.peak], true));
-        write::plot(path, title, ["displacement of the loaded nodes, mm", "load, kN"], &curves)
+        let (title, peak) = if self.stopped {
+            (format!("{title}: {}", self.ended), "highest so far".to_owned())
+        } else {
+            (title.to_owned(), format!("peak: {}", self.mode.words()))
+        };
+        curves.push(curve(&peak, &[self.peak], true));
+        write::plot(path, &title, ["displacement of the loaded nodes, mm", "load, kN"], &curves)
     }
 }
 
 impl Outcome {
-    /// Writes the steps as a table.
+    /// Writes the steps as a table; where they were stopped, the last line says so.
     ///
     /// # Errors
-    /// As [`csv`].
+    /// As [`write::csv`].
     pub fn write_steps(&self, path: &Path) -> Result<(), WriteError> {
         let row = |s: &Moment| {
             [
@@ -695,6 +733,7 @@ impl Outcome {
             ]
         };
         let rows: Vec<[f64; 5]> = self.steps.iter().map(row).collect();
-        csv(path, &["time_s", "load_factor", "max_displacement_m", "residual", "converged"], &rows)
+        let columns = ["time_s", "load_factor", "max_displacement_m", "residual", "converged"];
+        noted_csv(path, &columns, &rows, if self.stopped { self.complaint.as_str() } else { "" })
     }
 }

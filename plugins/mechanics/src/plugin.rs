@@ -12,9 +12,8 @@ use crate::{
     analysis::{Outcome, analyze},
     frame::joined,
     member::{Along, Meshing, prepare_within},
-    model::{Failure, MarchSettings},
+    model::MarchSettings,
     skin::{Looking, Seen},
-    sparse::SolveError,
 };
 
 /// Asks for the life of an assembly of the scene; one that runs or is there is begun anew.
@@ -146,9 +145,7 @@ fn life(scene: &Scene, wish: &Analyze, seen: Seen, job: &Job) -> Result<Life, Un
     let mut looking = Looking::new(&prepared, seen);
     match analyze(&prepared, MarchSettings::of_life(), job, &mut looking) {
         Ok((outcome, _)) => Ok(Life { outcome: Arc::new(outcome), damage: looking.damage }),
-        Err(Failure::Cancelled(_) | Failure::Solve(SolveError::Cancelled(_))) => {
-            Err(Unfinished::Cancelled)
-        }
+        Err(why) if why.is_cancelled() => Err(Unfinished::Cancelled),
         Err(other) => Err(because(&other)),
     }
 }

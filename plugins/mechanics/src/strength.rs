@@ -95,6 +95,9 @@ pub struct Strength {
     pub because: String,
     /// Why it was followed no further.
     pub ended: String,
+    /// Whether that is because somebody stopped it.
+    #[serde(default)]
+    pub stopped: bool,
 }
 
 /// Share of the peak at which a member counts as failed (the usual definition of ultimate
@@ -216,20 +219,27 @@ pub(crate) fn raise(
     let mut unit = if arc_only { nodes(structure).sqrt() } else { 1.0 };
     let (mut step, mut stiffness, mut is_arc) = (FIRST * length, None, arc_only);
     let (mut ended, mut at_peak) = (format!("{STEPS} steps were taken"), 0.0);
+    let mut stopped = false;
     for _ in 0..STEPS {
         // How many steps it takes nobody knows.
         let share = watch.curve.len() as f64 / STEPS as f64;
-        job.step(watch.curve.len().min(STEPS), STEPS)?;
+        let goes_on = job.step(watch.curve.len().min(STEPS), STEPS).map_err(Failure::from);
         let within = job.part(share, share);
         // A second a step, for whoever looks at the pictures.
         let time = march.history.time + 1.0;
-        let went = march.advance(time, step * unit, &within, |history, step| {
-            let points = structure.all_points(history)?;
-            watch.see(history, step, &points);
-            each(history, step, &points)
+        let went = goes_on.and_then(|()| {
+            march.advance(time, step * unit, &within, |history, step| {
+                let points = structure.all_points(history)?;
+                watch.see(history, step, &points);
+                each(history, step, &points)
+            })
         });
         match went {
             Ok(()) => {}
+            Err(why) if why.is_cancelled() => {
+                stopped = true;
+                break;
+            }
             Err(Failure::NotConverged { .. } | Failure::Solve(_))
                 if !is_arc && raised.along == Along::Automatic && watch.curve.len() > 1 =>
             {
@@ -266,7 +276,7 @@ pub(crate) fn raise(
         step = watch.next(step, length, &mut stiffness);
     }
     let history = march.history;
-    Ok((watch.tell(ended, job)?, history))
+    Ok((watch.tell(ended, stopped, job)?, history))
 }
 
 /// Whether steel of this name goes around the others.
@@ -518,7 +528,7 @@ impl<'a, 'm> Watch<'a, 'm> {
     }
 
     /// What it comes to.
-    fn tell(self, ended: String, job: &Job) -> Result<Strength, Failure> {
+    fn tell(self, mut ended: String, mut stopped: bool, job: &Job) -> Result<Strength, Failure> {
         let peak = self.curve[self.peak];
         let after = &self.curve[self.peak..];
         let ultimate = after.iter().find(|p| self.has_fallen(p, FAILED)).copied();
@@ -528,7 +538,18 @@ impl<'a, 'm> Watch<'a, 'm> {
             .map(|(u, y)| u.displacement_m / y.displacement_m)
             .filter(|d| *d >= 1.0);
         let has_failed = after.iter().any(|p| self.has_fallen(p, FALLS));
-        let (mode, mut because) = self.mode(has_failed, job)?;
+        let (mode, mut because) = match self.mode(has_failed, job) {
+            // A bar that has yielded tells of no failure yet.
+            Ok(_) if stopped && !has_failed => (Mode::None, "its load has not fallen".into()),
+            Err(why) if why.is_cancelled() => {
+                stopped = true;
+                (Mode::None, "what made its load fall is not known".into())
+            }
+            told => told?,
+        };
+        if stopped {
+            ended = "it was stopped".into();
+        }
         if mode == Mode::None {
             because = format!("{because}; {ended}");
         }
@@ -546,6 +567,7 @@ impl<'a, 'm> Watch<'a, 'm> {
             mode,
             because,
             ended,
+            stopped,
             curve: self.curve,
         })
     }

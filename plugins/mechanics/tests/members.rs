@@ -5,10 +5,12 @@ use std::sync::Arc;
 
 use glam::{Mat4, Quat, Vec3};
 use intrados_mechanics::{
-    analysis::analyze,
+    analysis::{Observer, analyze, analyze_until_stopped},
     material::{YEAR, chloride::Ingress},
     member::{Meshing, Prepared, prepare},
-    model::{Action, CONDUCTED, Gauge, MarchSettings, SteelKind, System},
+    model::{
+        Action, CONDUCTED, Failure, Gauge, History, MarchSettings, Point, SteelKind, Step, System,
+    },
     strength::Mode,
 };
 use intrados_scene::{
@@ -572,20 +574,25 @@ fn cubes_that_miss_the_volume_are_made_smaller_or_refused() {
     assert!(why.contains("no cube") && why.contains("choose a smaller edge"), "{why}");
 }
 
+/// Half of a beam, its middle at the end of the axis, pressed by a jack near there.
+fn half_beam(loading: &str) -> Prepared {
+    let scene = from_text(&format!(
+        "members: [(id: \"B\", at: (0, 0, 0), concrete: \"C30/37\", body: Beam(section: Rectangle(width_m: 0.2, depth_m: 0.4), length_m: 1.1,
+                reinforcement: (cover_mm: 35, bars: [Row(side_deg: 180, count: 2, diameter_mm: 12)], stirrups: (diameter_mm: 8, spacing_mm: 100))))],
+             supports: [(member: \"B\", place: Surface(from: 0.0909, to: 0.0909, side_deg: 180), hold: Directions(x: false, y: true, z: true)),
+                (member: \"B\", place: End, hold: Directions(x: true, y: false, z: false))],
+             loads: [(name: \"jack\", action: Force(place: Surface(from: 0.9, to: 1, side_deg: 0), force_kn: (0, -10, 0)), history: [(28, 0)], loading: {loading})]"
+    ));
+    first(&scene, 0.1)
+}
+
 /// Half of a beam with two bars of 12 mm, its middle at the end of the axis: they yield at M = A_s
 /// f_y z, z by the block of stresses that they need, and go on yielding. Bricks of 100 mm, four over
 /// the depth, give the compressed zone a longer arm. Or it is moved as far as was asked for.
 #[test]
 fn a_beam_is_raised_until_its_bars_have_yielded() {
     let raised = |loading: &str| {
-        let scene = from_text(&format!(
-            "members: [(id: \"B\", at: (0, 0, 0), concrete: \"C30/37\", body: Beam(section: Rectangle(width_m: 0.2, depth_m: 0.4), length_m: 1.1,
-                reinforcement: (cover_mm: 35, bars: [Row(side_deg: 180, count: 2, diameter_mm: 12)], stirrups: (diameter_mm: 8, spacing_mm: 100))))],
-             supports: [(member: \"B\", place: Surface(from: 0.0909, to: 0.0909, side_deg: 180), hold: Directions(x: false, y: true, z: true)),
-                (member: \"B\", place: End, hold: Directions(x: true, y: false, z: false))],
-             loads: [(name: \"jack\", action: Force(place: Surface(from: 0.9, to: 1, side_deg: 0), force_kn: (0, -10, 0)), history: [(28, 0)], loading: {loading})]"
-        ));
-        let prepared = first(&scene, 0.1);
+        let prepared = half_beam(loading);
         let life =
             analyze(&prepared, MarchSettings::of_life(), &Job::default(), &mut ()).unwrap().0;
         life.strength.unwrap()
@@ -607,4 +614,50 @@ fn a_beam_is_raised_until_its_bars_have_yielded() {
     assert!(far.ended.contains("2.0 mm asked for"), "{}", far.ended);
     let last = far.curve[far.curve.len() - 1];
     assert!((last.displacement_m.abs() - 2e-3).abs() < 1e-6, "{last:?}");
+}
+
+/// Cancels a job once it has seen so many equilibria.
+struct Cancels<'a>(&'a Job, usize);
+
+impl Observer for Cancels<'_> {
+    fn see(&mut self, _: &System, _: &History, _: &Step, _: &[[Point; 8]]) -> Result<(), Failure> {
+        self.1 -= 1;
+        if self.1 == 0 {
+            self.0.cancel();
+        }
+        Ok(())
+    }
+}
+
+/// Whoever stops a life, or what comes after it, has all of it until then; where nobody asks for
+/// that it is none.
+#[test]
+fn what_is_stopped_is_kept_until_then() {
+    let settings = MarchSettings::of_life();
+    let stopped = |prepared: &Prepared, after: usize| {
+        let job = Job::default();
+        let mut cancels = Cancels(&job, after);
+        analyze_until_stopped(prepared, settings, &job, &mut cancels).unwrap().0
+    };
+    let column = prepared("column", "C1", 0.2);
+    let life = stopped(&column, 3);
+    assert!(life.stopped && life.steps.len() == 3 && life.strength.is_none(), "{life:?}");
+    assert!(life.complaint.starts_with("it was stopped on day "), "{}", life.complaint);
+    let job = Job::default();
+    let none = analyze(&column, settings, &job, &mut Cancels(&job, 3)).map(drop);
+    assert!(none.is_err_and(|why| why.is_cancelled()));
+
+    let beam = half_beam("Displacement(to_mm: 0.1)");
+    let whole = analyze(&beam, settings, &Job::default(), &mut ()).unwrap().0;
+    let part = stopped(&beam, whole.steps.len() + 4);
+    assert!(part.stopped && part.steps == whole.steps && !whole.stopped, "{}", part.complaint);
+    let (all, found) = (whole.strength.unwrap(), part.strength.unwrap());
+    assert!(found.curve == all.curve[..5] && found.stopped && found.mode == Mode::None);
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str| folder.path().join(name);
+    found.write_curve(&file("curve.csv")).unwrap();
+    found.plot_curve(&file("curve.svg"), "beam").unwrap();
+    let read = |name: &str| std::fs::read_to_string(file(name)).unwrap();
+    assert!(read("curve.csv").ends_with("\n# it was stopped\n"), "{}", read("curve.csv"));
+    assert!(read("curve.svg").contains("beam: it was stopped"));
 }

@@ -31,9 +31,15 @@ pub(crate) fn limits(
     members: &[MemberPrediction],
     items: &[ledger::Item],
     unraised: &[(&str, &str)],
+    by_strength: bool,
 ) -> Vec<String> {
+    let damage = if by_strength {
+        "Damage is the share of a member's strength that what is known of it costs, computed by finite elements. Of a zone without a slice of its own the others speak as far as the grading scale's correlation lengths reach, with an error that grows."
+    } else {
+        "Damage is the share of strength lost in the worst zone (a tenth of the length). Of a zone without a slice of its own the others speak as far as the grading scale's correlation lengths reach, with an error that grows."
+    };
     let mut limits = vec![
-        "Damage is the share of strength lost in the worst zone (a tenth of the length). Of a zone without a slice of its own the others speak as far as the grading scale's correlation lengths reach, with an error that grows.".to_owned(),
+        damage.to_owned(),
         "Slices show pores and cracks, and where they show the whole section what has fallen off and how much of its bars is left; they do not show lost stiffness, nor what lies between them. A forecast knows of loads and chlorides, not of bad workmanship; gauges feel stiffness, not strength. The error bars allow for that by what the grading scale declares.".to_owned(),
         "The rule that turns sections into damage is the grading scale's, and is not part of the error bars.".to_owned(),
         "Cracks that run through large voids or honeycomb, or are much narrower than a third of a pixel, are missed; a gap along a bar counts as a crack.".to_owned(),
@@ -48,6 +54,17 @@ pub(crate) fn limits(
     let not_raised =
         |(name, why): &(&str, &str)| format!("The strength of {name} was not computed: {why}.");
     limits.extend(unraised.iter().map(not_raised));
+    let by_zone = members.iter().filter(|m| by_strength && m.damage.is_some() && !m.by_strength);
+    let by_zone: Vec<&str> = by_zone.map(|m| m.name.as_str()).collect();
+    if !by_zone.is_empty() {
+        limits.insert(
+            0,
+            format!(
+                "Not graded by strength but by the worst zone (a tenth of the length), since what they bear is not computed: {}.",
+                by_zone.join(", ")
+            ),
+        );
+    }
     let silent = members.iter().filter(|m| m.damage.is_none()).count();
     if silent > 0 {
         limits.insert(

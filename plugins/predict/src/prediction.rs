@@ -99,7 +99,11 @@ pub struct MemberPrediction {
     pub causes: BTreeMap<Cause, Zones>,
     /// The zone that counts, from 0.
     pub worst_zone: Option<usize>,
-    /// By state, the share of the length that is to be expected in it; of what is known.
+    /// Whether its damage is the share of its strength that it costs, as the profile may want, and
+    /// not that of its worst zone.
+    pub by_strength: bool,
+    /// By state, the share of the length that is to be expected in it, of what is known; where it is
+    /// graded by strength, the probability that all of it is in that state.
     pub states: BTreeMap<String, f64>,
     /// What it bears and what its damage costs of that; none where nobody asked, or no load acts on
     /// it that could be raised.

@@ -4,7 +4,7 @@
 
 use std::fs;
 
-use intrados_damage::{Cause, Sources};
+use intrados_damage::{Cause, Sources, grading::Profile};
 use intrados_predict::{PredictSettings, Prediction, predict};
 use intrados_scene::Scene;
 use intrados_stage::Job;
@@ -80,6 +80,52 @@ fn a_reading_from_nowhere_is_not_used() {
     let prediction = predicted("XC4", "(member: \"C1\", name: \"pot\", shows: HalfCell(mv: -420))");
     let why = prediction.items[0].why.clone().unwrap();
     assert!(why.contains("add along") && prediction.members[0].damage.is_none(), "{why}");
+}
+
+/// By a profile that grades by strength a stub under a jack has the damage that its bad concrete
+/// costs, and the states of that; one that nothing presses has that of its worst zone, which is said.
+#[test]
+fn what_damage_costs_is_graded_or_it_is_said_that_it_is_not() {
+    let folder = tempfile::tempdir().unwrap();
+    let stub = |id: &str, x: f64| {
+        format!(
+            "(id: \"{id}\", name: \"stub {id}\", at: ({x}, 0, 0), concrete: \"C30/37\", body: Column(section: Rectangle(width_m: 0.2, depth_m: 0.2), height_m: 0.4))"
+        )
+    };
+    let held = |id: &str| {
+        format!("(member: \"{id}\", place: Start, hold: Directions(x: true, y: true, z: true))")
+    };
+    let scene = format!(
+        "(schema: \"intrados.scene/1\", members: [{}, {}], supports: [{}, {}], \
+         loads: [(name: \"jack\", members: [\"A\"], action: Force(place: End, force_kn: (0, -100, 0)), history: [(28, 0), (29, 1)])])",
+        stub("A", 0.0),
+        stub("B", 2.0),
+        held("A"),
+        held("B")
+    );
+    fs::write(folder.path().join("scene.ron"), scene).unwrap();
+    let core = |id: &str| {
+        format!(
+            "(member: \"{id}\", name: \"core {id}\", along: 0.45, face: Front, shows: CoreStrength(mpa: 16, diameter_mm: 100, length_mm: 200))"
+        )
+    };
+    let evidence =
+        format!("(schema: \"intrados.evidence/1\", items: [{}, {}])", core("A"), core("B"));
+    fs::write(folder.path().join("evidence.ron"), evidence).unwrap();
+    let job = Job::default();
+    let scene = Scene::load(&folder.path().join("scene.ron"), &job).unwrap();
+    let profile = Profile { by_strength: true, ..Profile::default() };
+    let settings = PredictSettings { profile, forecast: None, ..PredictSettings::default() };
+    let prediction = predict(&scene, settings, &Sources::default(), &job).unwrap();
+    let [a, b] = &prediction.members[..] else { panic!() };
+    let cost = a.capacity.as_ref().unwrap().cost;
+    assert!(a.by_strength && a.damage == Some(cost.value) && cost.value > 0.1, "{:?}", a.capacity);
+    // No crack was seen: its states are what its damage alone says.
+    assert_eq!(a.states, a.state_probability);
+    assert!(!b.by_strength && b.capacity.is_none() && b.damage.is_some());
+    let told = |line: &str| prediction.limits.iter().any(|l| l.contains(line));
+    assert!(told("Not graded by strength") && told("is not computed: stub B."));
+    assert!(told("member's strength that what is known of it costs"), "{:?}", prediction.limits);
 }
 
 /// Half the strength that the class promises, in three cores of one place.

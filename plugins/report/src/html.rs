@@ -407,7 +407,8 @@ impl<'a> Page<'a> {
         self.p.profile.fusion.blindness.iter().map(one).collect()
     }
 
-    /// Shares of its length that are to be expected in each state, from the best.
+    /// Shares of its length that are to be expected in each state, or the probability of each where
+    /// it is graded by strength, from the best.
     fn shares(&self, m: &MemberPrediction) -> Vec<String> {
         let share = |name: &str| Some(format!("{:.0} % {name}", 100.0 * m.states.get(name)?));
         self.p.profile.states.iter().filter_map(|s| share(&s.name)).collect()

@@ -309,6 +309,14 @@ struct Balance {
     rests: bool,
 }
 
+impl Failure {
+    /// Whether somebody asked the work to stop.
+    #[must_use]
+    pub fn is_cancelled(&self) -> bool {
+        matches!(self, Self::Cancelled(_) | Self::Solve(SolveError::Cancelled(_)))
+    }
+}
+
 impl<'s, 'm> March<'s, 'm> {
     /// Starts from a history.
     #[must_use]

@@ -25,8 +25,18 @@ pub use vtu::{Field, Grid, Series};
 /// # Errors
 /// The file cannot be written, or a row has another length than the head.
 pub fn csv<R: AsRef<[f64]>>(path: &Path, columns: &[&str], rows: &[R]) -> Result<(), WriteError> {
+    noted_csv(path, columns, rows, "")
+}
+
+/// The same with a last line `# …` of what its reader must know; empty: there is none.
+pub(crate) fn noted_csv<R: AsRef<[f64]>>(
+    path: &Path,
+    columns: &[&str],
+    rows: &[R],
+    note: &str,
+) -> Result<(), WriteError> {
     put(path, |out| {
-        let mut table = csv::Writer::from_writer(out);
+        let mut table = csv::Writer::from_writer(&mut *out);
         table.write_record(columns.iter().map(|name| text(name).into_owned()))?;
         for (r, row) in rows.iter().map(AsRef::as_ref).enumerate() {
             if row.len() != columns.len() {
@@ -39,7 +49,9 @@ pub fn csv<R: AsRef<[f64]>>(path: &Path, columns: &[&str], rows: &[R]) -> Result
             }
             table.write_record(row.iter().map(|value| format!("{value:?}")))?;
         }
-        table.flush()
+        table.flush()?;
+        drop(table);
+        if note.is_empty() { Ok(()) } else { writeln!(out, "# {note}") }
     })
 }
 
@@ -67,7 +79,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("new/history.csv");
         let rows = [[0.1 + 0.2, -1e-300], [f64::NAN, 1.0 / 3.0]];
-        csv(&path, &["time_s", "force \"z\", N"], &rows).unwrap();
+        noted_csv(&path, &["time_s", "force \"z\", N"], &rows, "it was stopped").unwrap();
         let text = std::fs::read_to_string(&path).unwrap();
         let mut lines = text.lines();
         assert_eq!(lines.next(), Some("time_s,\"force \"\"z\"\", N\""));
@@ -76,6 +88,7 @@ mod tests {
                 lines.next().unwrap().split(',').map(|w| w.parse().unwrap()).collect();
             assert!(back.iter().zip(row).all(|(a, b)| a.to_bits() == b.to_bits()), "{back:?}");
         }
+        assert_eq!((lines.next(), lines.next()), (Some("# it was stopped"), None));
     }
 
     #[test]

@@ -224,8 +224,12 @@ impl Predictor {
         let said: Vec<&Evidence> =
             evidence.values().filter(|e| whole.counted.contains(e.source)).collect();
         let capacity = self.capacity(scene, &member.id).cloned();
-        let cost = capacity.as_ref().filter(|_| profile.by_strength).map(|c| c.cost);
+        // Of what nothing is known damage is not nothing.
+        let by_strength = profile.by_strength && whole.damage().is_some();
+        let cost = capacity.as_ref().filter(|_| by_strength).map(|c| c.cost);
         let damage = cost.or_else(|| whole.damage());
+        let zones = whole.zones.0.iter().flatten().copied();
+        let graded: Vec<Estimate> = cost.map_or_else(|| zones.collect(), |cost| vec![cost]);
         let zone_basis = Basis::by_zone(&said);
         let found = survey::of_member(scene, &member.id).map(|(_, o)| o);
         let nothing = Shown::default();
@@ -257,7 +261,8 @@ impl Predictor {
             advice: verdict.advice,
             within_months: verdict.within_months,
             to_inspect: verdict.to_inspect,
-            states: shares(&whole, profile),
+            by_strength: cost.is_some(),
+            states: shares(&graded, profile),
             capacity,
             crack_check: widest.and_then(|widest| crack_check(scene, member, widest, profile)),
             conflict: !conflicts.is_empty(),
@@ -388,14 +393,13 @@ pub(super) fn part_of<'a>(
     }
 }
 
-/// Shares of the known zones that are to be expected in each state.
-fn shares(whole: &Whole, profile: &Profile) -> BTreeMap<String, f64> {
-    let known: Vec<Estimate> = whole.zones.0.iter().flatten().copied().collect();
-    let of = |zone| Verdict::of(profile, Some(zone), &[], Basis::Measured, Looked::NOWHERE);
+/// Shares of what has these damages that are to be expected in each state.
+fn shares(damages: &[Estimate], profile: &Profile) -> BTreeMap<String, f64> {
+    let of = |damage| Verdict::of(profile, Some(damage), &[], Basis::Measured, Looked::NOWHERE);
     let mut shares = BTreeMap::new();
-    for zone in &known {
-        for (state, p) in of(*zone).probability {
-            *shares.entry(state).or_default() += p / known.len() as f64;
+    for damage in damages {
+        for (state, p) in of(*damage).probability {
+            *shares.entry(state).or_default() += p / damages.len() as f64;
         }
     }
     shares

@@ -122,6 +122,19 @@ impl Set {
         self.names.iter().map(|name| self.folder.join(name)).collect()
     }
 
+    /// Puts what is written of its files into another set, too.
+    ///
+    /// # Errors
+    /// They cannot be read, or the other's cannot be written.
+    pub fn copy_into(&self, other: &mut Self) -> io::Result<()> {
+        for name in self.names.iter().filter(|name| self.aside.join(name).is_file()) {
+            let (from, to) = (self.aside.join(name), other.place(name.as_str()));
+            // Files are replaced and never written into: a link is as good as a copy, and at once.
+            fs::hard_link(&from, &to).or_else(|_| fs::copy(&from, &to).map(drop))?;
+        }
+        Ok(())
+    }
+
     /// How many finished parts of the work are kept.
     #[must_use]
     pub fn parts(&self) -> usize {
@@ -338,6 +351,24 @@ mod tests {
         assert!(!folder.path().join("a.txt").exists());
         drop(alive);
         assert_eq!(names(folder.path()), ["b.txt"]);
+    }
+
+    /// What is written so far can be published apart, and the set goes on.
+    #[test]
+    fn what_is_written_so_far_can_be_published_apart() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut set = Set::begin(folder.path()).unwrap();
+        set.put("a.txt", b"first").unwrap();
+        set.place("b.txt");
+        let mut apart = Set::begin(&folder.path().join("apart")).unwrap();
+        set.copy_into(&mut apart).unwrap();
+        apart.put("list.json", b"{}").unwrap();
+        apart.publish("list.json").unwrap();
+        assert_eq!(names(&folder.path().join("apart")), ["a.txt", "list.json"]);
+        write(&mut set, "second");
+        set.publish("list.json").unwrap();
+        let read = |name: &str| fs::read_to_string(folder.path().join(name)).unwrap();
+        assert_eq!([read("a.txt"), read("apart/a.txt")], ["second", "first"]);
     }
 
     /// Parts of an unpublished set are there for the next one of the same key, bit by bit; those
