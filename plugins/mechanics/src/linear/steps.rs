@@ -374,6 +374,7 @@ impl Reader {
                 Thin::Beam { shape: Shape::Hex8Bubbles, .. }
                 | Thin::Shell { shape: Shape::Hex8Bubbles, .. },
             ) => Some("C3D8I, B31 and S4"),
+            Kind::Solid(Shape::Hex8Mean | Shape::Bar) => Some("C3D8R and T3D2"),
             Kind::Link(Link::Damper) => Some("dashpots"),
             _ => None,
         };
