@@ -17,7 +17,7 @@ use intrados_mechanics::{
     material::law::Cracks,
     member::{Along, Axes, MemberError, Meshing, Prepared, prepare_within},
     mesh::voxel::VoxelError,
-    model::{self, MarchSettings, Regularisation},
+    model::{self, MarchSettings, Matter, Regularisation},
     read::{self, ReadError, Units},
     skin::{Looking, Seen},
     strength::{CurvePoint, Strength},
@@ -212,7 +212,11 @@ fn told(session: &Session, report: &Report) -> Result<Outcome, Failure> {
 
 impl Work {
     fn settings(&self, args: &args::Analyze) -> MarchSettings {
-        let usual = if self.is_scene { MarchSettings::of_life() } else { MarchSettings::of_deck() };
+        let usual = if self.is_scene || self.prepared.iter().any(cracks) {
+            MarchSettings::of_life()
+        } else {
+            MarchSettings::of_deck()
+        };
         MarchSettings { tolerance: args.tolerance.unwrap_or(usual.tolerance), ..usual }
     }
 
@@ -394,6 +398,11 @@ fn whole_of(session: &Session, scene: &Scene, asked: bool) -> Result<Option<Whol
         }
         found => found.map(Some),
     }
+}
+
+/// Whether any of it is concrete that may crack: an equilibrium is found as those of a life are.
+fn cracks(prepared: &Prepared) -> bool {
+    prepared.model.bodies.iter().any(|body| matches!(body.matter, Matter::Concrete(_)))
 }
 
 /// What a deck is.

@@ -8,6 +8,7 @@
 //! in later are born then, free of stress. What cannot be computed as it is written is refused by
 //! name: nothing that changes the answer is skipped.
 
+mod concrete;
 mod course;
 mod steel;
 
@@ -19,7 +20,7 @@ use intrados_stage::Job;
 
 use crate::{
     element::{ElementError, embed::EmbedError, hex8::Kind, load},
-    material::{durability::CorrosionError, steel::Bar},
+    material::durability::CorrosionError,
     member::{Part, Prepared},
     mesh::{ElementId, HexFace, Locator, Mesh},
     model::{
@@ -39,6 +40,8 @@ pub struct Case {
     pub steps: Vec<(String, f64)>,
     /// What the user should know.
     pub notes: Vec<String>,
+    /// Ends of all increments, s, those of the steps among them.
+    moments: Vec<f64>,
 }
 
 /// Why a deck cannot be computed. One line.
@@ -78,17 +81,19 @@ impl Case {
         let times = Times::new(&deck)?;
         let mut model =
             Model { kind: kind(&deck)?, mesh: std::mem::take(&mut deck.mesh), ..Model::default() };
-        for section in &deck.sections {
+        let mut notes = std::mem::take(&mut deck.notes);
+        for (region, section) in deck.sections.iter().enumerate() {
             let Some(material) = deck.materials.get(section.material as usize) else {
                 return unfit("a section names no material");
             };
-            model
-                .bodies
-                .push(Body { matter: matter(material, section.kind)?, birth: f64::NEG_INFINITY });
+            let size = || mean_edge(&model.mesh, region);
+            let matter = matter(material, section.kind, size, &mut notes)?;
+            model.bodies.push(Body { matter, birth: f64::NEG_INFINITY });
         }
+        let cracks = model.bodies.iter().any(|body| matches!(body.matter, Matter::Concrete(_)));
         let bearing = births(&deck, &mut model, &times)?;
-        let mut case =
-            Self { model, steps: times.ends(&deck), notes: std::mem::take(&mut deck.notes) };
+        let (steps, moments) = (times.ends(&deck), times.moments(&deck, cracks));
+        let mut case = Self { model, steps, notes, moments };
         case.initial(&deck)?;
         case.loads(&deck, &times)?;
         // Last, because it renumbers the rods that stay.
@@ -118,7 +123,6 @@ impl Case {
         if !mesh.shells.is_empty() {
             self.notes.push("stresses of shells are not reported: their displacements are".into());
         }
-        let times = self.steps.iter().map(|s| s.1).collect();
         let reach = mesh.bounds().map_or(DVec3::ZERO, |[low, high]| high - low);
         let longest = DVec3::AXES[reach.max_position()];
         let corrosion = Err(CorrosionError::Deck);
@@ -126,7 +130,7 @@ impl Case {
             id: id.into(),
             model: self.model,
             begin: 0.0,
-            times,
+            times: self.moments,
             parts,
             axis: None,
             direction: longest,
@@ -151,9 +155,9 @@ impl Case {
     ) -> Result<History, Failure> {
         let structure = System::new(&self.model)?;
         let mut march = March::new(&structure, structure.rest(0.0), Drive::Loads, settings);
-        for (i, (name, end)) in self.steps.iter().enumerate() {
-            job.step(i, self.steps.len())?;
-            tracing::debug!("{name} to {end:.4e} s");
+        for (i, end) in self.moments.iter().enumerate() {
+            job.step(i, self.moments.len())?;
+            tracing::debug!("to {end:.4e} s");
             march.advance(*end, 0.0, job, |history, step| each(&structure, history, step))?;
         }
         Ok(march.history)
@@ -436,18 +440,55 @@ fn kind(deck: &Deck) -> Result<Kind, DeckError> {
     })
 }
 
-/// The law of a region.
-fn matter(material: &Material, kind: SectionKind) -> Result<Matter, DeckError> {
+/// Edge of a cube as large as the bricks of a region in the mean, m.
+fn mean_edge(mesh: &Mesh, region: usize) -> f64 {
+    let volumes = || {
+        let cells = (0..).zip(&mesh.hexes).filter(|(_, cell)| cell.region as usize == region);
+        cells.map(|(hex, _)| mesh.hex_volume(hex))
+    };
+    (volumes().sum::<f64>() / volumes().count().max(1) as f64).cbrt()
+}
+
+/// The law of a region of bricks of such a size.
+fn matter(
+    material: &Material,
+    kind: SectionKind,
+    size: impl Fn() -> f64,
+    notes: &mut Vec<String>,
+) -> Result<Matter, DeckError> {
     let Some((modulus, poisson)) = material.elastic else {
         return unfit(format!("material {}: no *ELASTIC", material.name));
     };
+    if let Some(said) = &material.concrete {
+        return match kind {
+            SectionKind::Solid => {
+                concrete::concrete(material, said, (modulus, poisson), size(), notes)
+            }
+            SectionKind::Shell { .. } | SectionKind::Rod { .. } => unfit(format!(
+                "line {}: material {}: only bricks crack; give shells and rods a material without *CONCRETE DAMAGED PLASTICITY",
+                said.line, material.name
+            )),
+        };
+    }
+    if !material.yielding.is_empty() && !matches!(kind, SectionKind::Rod { .. }) {
+        return unfit(format!(
+            "material {}: *PLASTIC beside concrete that cracks is of bars (T3D2) alone; give bricks and shells an elastic material",
+            material.name
+        ));
+    }
+    if material.yielding.len() > 2 {
+        notes.push(format!(
+            "material {}: bars harden along the line from the first to the last point of *PLASTIC",
+            material.name
+        ));
+    }
     let (expansion, density) = (material.expansion.unwrap_or(0.0), material.density.unwrap_or(0.0));
     let elastic = Elastic { modulus, poisson, expansion, density };
     Ok(match kind {
         SectionKind::Solid => Matter::Elastic(elastic),
         SectionKind::Shell { thickness } => Matter::Shell { elastic, thickness },
         SectionKind::Rod { area } => {
-            Matter::Bar { steel: Bar::elastic(modulus), area, expansion, density }
+            Matter::Bar { steel: steel::bar(modulus, &material.yielding), area, expansion, density }
         }
     })
 }

@@ -36,6 +36,21 @@ impl Times {
         deck.steps.iter().map(|s| s.name.clone()).zip(self.0[1..].iter().copied()).collect()
     }
 
+    /// When equilibria are looked for: at the ends of steps; where something `cracks`, at the ends of
+    /// increments as long as each step's first one, of which a step has ten to a thousand.
+    pub(super) fn moments(&self, deck: &Deck, cracks: bool) -> Vec<f64> {
+        let mut moments = Vec::new();
+        for (step, ends) in deck.steps.iter().zip(self.0.windows(2)) {
+            let [from, to] = [ends[0], ends[1]];
+            let first = step.increments[0].unwrap_or(to - from);
+            let wanted = ((to - from) / first).round().clamp(10.0, 1000.0) as usize;
+            let count = if cracks { wanted } else { 1 };
+            moments.extend((1..count).map(|i| from + (to - from) * i as f64 / count as f64));
+            moments.push(to);
+        }
+        moments
+    }
+
     /// The course of a target from what each step says of it, counted from `start`, which is also
     /// what it goes back to where a step drops it.
     pub(super) fn course(

@@ -5,10 +5,20 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use super::{Case, DeckError, locate, unfit};
 use crate::{
     element::{embed::embed, rod::Piece},
+    material::steel::Bar,
     mesh::{ElementId, Locator},
     model::{Action, Matter, Steel, SteelKind},
     read::Deck,
 };
+
+/// A bar that yields by a table of stress over plastic strain, on the line between its ends; one
+/// that never does without a table.
+pub(super) fn bar(modulus: f64, yielding: &[(f64, f64)]) -> Bar {
+    let elastic = Bar::elastic(modulus);
+    let (Some(first), Some(last)) = (yielding.first(), yielding.last()) else { return elastic };
+    let slope = if last.1 > first.1 { (last.0 - first.0) / (last.1 - first.1) } else { 0.0 };
+    Bar { yielding: first.0, hardening: modulus * slope / (modulus + slope), ..elastic }
+}
 
 /// Pieces of a region's embedded bars, each with the stress before the first step.
 type Laid = BTreeMap<u32, (Vec<Piece>, Vec<f64>)>;

@@ -138,3 +138,63 @@ fn what_cannot_be_computed_is_named() {
         .to_string();
     assert!(why.contains("around node 1 is free to move along (1.00, 0.00, 0.00)"), "{why}");
 }
+
+/// A cube of 1 m whose far face is drawn away, of concrete that cracks.
+fn drawn(stiffening: &str, by: f64) -> String {
+    let law = format!(
+        "*CONCRETE DAMAGED PLASTICITY\n36,.1,1.16,.667,0\n*CONCRETE COMPRESSION HARDENING\n20e6,0\n30e6,1e-3\n5e6,1e-2\n*CONCRETE TENSION STIFFENING, {stiffening}*SOLID SECTION"
+    );
+    let moved: String = [2, 3, 6, 7].iter().map(|n| format!("{n},1,1,{by}\n")).collect();
+    CUBE.replacen("*SOLID SECTION", &law, 1)
+        .replace("30000,0.2", "30e9,0.0")
+        .replace("*DENSITY\n2\n", "*DENSITY\n2400\n")
+        + &format!("*STEP\n*STATIC\n.005,1\n*BOUNDARY\n{moved}*END STEP\n")
+}
+
+/// Drawn apart, it bears what its table of tension says it does, and what all of its cracks took is
+/// its fracture energy, however the table is written.
+#[test]
+fn damaged_plasticity_cracks() {
+    for stiffening in [
+        "TYPE=DISPLACEMENT\n2.5e6,0\n0,1.6e-4\n",
+        "TYPE=GFI\n2.5e6,200\n",
+        "TYPE=STRAIN\n2.5e6,0\n0,1.6e-4\n",
+    ] {
+        let case = case(&drawn(stiffening, 6e-4)).unwrap();
+        assert!(case.notes.iter().any(|n| n.contains("f_ct 2.5000 MPa, G_f 200.0000 N/m")));
+        let settings = MarchSettings::of_life();
+        let (mut work, mut last, mut most) = (0.0, (0.0, 0.0), 0.0_f64);
+        case.run(settings, &Job::default(), |_, history, step| {
+            let now = (6e-4 * step.time, stress(&case, history));
+            work += 0.5 * (now.0 - last.0) * (now.1 + last.1);
+            most = most.max(now.1);
+            last = now;
+            Ok(())
+        })
+        .unwrap();
+        assert!(most > 2.4e6 && most < 2.5e6 * 1.001, "{most}");
+        assert!((work / 200.0 - 1.0).abs() < 0.03, "{work} {last:?}");
+    }
+}
+
+#[test]
+fn concrete_that_nobody_can_crack_is_refused() {
+    let text = drawn("TYPE=GFI\n2.5e6,200\n", 1e-4);
+    for (from, to, reason) in [
+        ("2.5e6,200", "25e6,200", "tensile strength"),
+        ("30e9,0.0", "30e9,0.48", "Poisson's ratio"),
+        ("2.5e6,200", "2.5e6,.2", "fracture energy"),
+    ] {
+        let why = case(&text.replace(from, to)).unwrap_err();
+        assert!(why.contains("line 19: material C") && why.contains(reason), "{why} / {reason}");
+    }
+}
+
+/// A bar that yields by its table: what it bears is capped.
+#[test]
+fn bars_in_concrete_yield() {
+    let bar = steel::bar(200e9, &[(400e6, 0.0), (450e6, 0.05)]);
+    assert_eq!(bar.yielding, 400e6);
+    assert!((1.0 / (1.0 / bar.hardening - 1.0 / bar.modulus) / 1e9 - 1.0).abs() < 1e-9);
+    assert_eq!(steel::bar(200e9, &[]), crate::material::steel::Bar::elastic(200e9));
+}

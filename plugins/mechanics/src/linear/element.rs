@@ -1,13 +1,13 @@
 //! One element: its stiffness, its forces, its stresses.
 
 use glam::DVec3;
-use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, Vector3, Vector6};
 
 use super::{
     law::Elastic,
     model::{Cell, Deck, Material, Orientation, Step},
     plastic::{Flow, Metal},
-    shape::{Jet, Point, Shape, face_functions},
+    shape::{Jet, Point, Shape, face_functions, face_places},
 };
 use crate::tensor::{self, Frame, Tangent, Voigt};
 
@@ -90,6 +90,18 @@ impl<'a> Element<'a> {
     pub(super) fn at(&self, natural: [f64; 3], weight: f64) -> Result<At, Folded> {
         let jets = self.cell.shape.functions(natural);
         let place = self.place(&jets);
+        if self.cell.shape == Shape::Bar {
+            let (along, length) = self.bar().ok_or(Folded)?;
+            // ∂ξ/∂x = 2/L along it, and nothing across.
+            let slope = |jet: &Jet| (2.0 * jet.slope[0] / length * along).to_array();
+            let slopes = jets.iter().map(slope).collect();
+            return Ok(At {
+                slopes,
+                volume: 0.5 * weight * length * self.cell.across,
+                jets,
+                place,
+            });
+        }
         let jacobian = self.jacobian(&jets);
         let inverse = inverse_transposed(&jacobian).ok_or(Folded)?;
         let slopes = jets
@@ -98,6 +110,12 @@ impl<'a> Element<'a> {
             .collect();
         let volume = weight * jacobian[0].dot(jacobian[1].cross(jacobian[2]));
         Ok(At { jets, slopes, place, volume })
+    }
+
+    /// Direction and length of a bar; none where its ends are one.
+    fn bar(&self) -> Option<(DVec3, f64)> {
+        let &[a, b] = self.places.as_slice() else { return None };
+        Some(((b - a).try_normalize()?, a.distance(b)))
     }
 
     /// Points of integration.
@@ -132,20 +150,28 @@ impl<'a> Element<'a> {
         let law = material.elastic.as_ref().map_or([[0.0; 6]; 6], |l| l.stiffness(now));
         let free = material.expansion.as_ref().map_or([0.0; 3], |l| l.strain(now, cold));
         let free = [free[0], free[1], free[2], 0.0, 0.0, 0.0];
-        match axes.map(|o| o.frame(at.place)) {
+        let (law, free) = match axes.map(|o| o.frame(at.place)) {
             None => (law, free),
             Some(frame) => (
                 tensor::rotate_tangent(&law, &frame),
                 tensor::rotate_strain(&free, &tensor::transposed(&frame)),
             ),
+        };
+        match self.bar().filter(|_| self.cell.shape == Shape::Bar) {
+            Some((along, _)) => (uniaxial(&law, along), free),
+            None => (law, free),
         }
     }
 
-    /// As [`Element::at`], with the slopes of bubbles after those of the nodes where the shape has
-    /// some: 1 − ξ² of each axis, with the Jacobian of the middle so that a constant strain stays
-    /// one (Taylor, Beresford and Wilson 1976).
-    fn bubbled(&self, natural: [f64; 3], weight: f64) -> Result<At, Folded> {
+    /// As [`Element::at`], with slopes and volume of the mean where the shape takes that, and with
+    /// the slopes of bubbles after those of the nodes where it has some: 1 − ξ² of each axis, with
+    /// the Jacobian of the middle so that a constant strain stays one (Taylor, Beresford and Wilson
+    /// 1976).
+    fn strained(&self, natural: [f64; 3], weight: f64) -> Result<At, Folded> {
         let mut at = self.at(natural, weight)?;
+        if self.cell.shape == Shape::Hex8Mean {
+            (at.slopes, at.volume) = self.mean()?;
+        }
         if self.cell.shape != Shape::Hex8Bubbles {
             return Ok(at);
         }
@@ -157,6 +183,44 @@ impl<'a> Element<'a> {
         Ok(at)
     }
 
+    /// Slopes of its functions in the mean of its volume, and that volume.
+    fn mean(&self) -> Result<(Vec<[f64; 3]>, f64), Folded> {
+        let (mut sums, mut volume) = (vec![DVec3::ZERO; self.places.len()], 0.0);
+        for (natural, weight) in Shape::Hex8.points() {
+            let at = self.at(natural, weight)?;
+            volume += at.volume;
+            let slopes = at.slopes.iter().copied().map(DVec3::from_array);
+            sums.iter_mut().zip(slopes).for_each(|(sum, slope)| *sum += at.volume * slope);
+        }
+        Ok((sums.into_iter().map(|sum| (sum / volume).to_array()).collect(), volume))
+    }
+
+    /// What keeps a brick of mean strain from deforming without any: four patterns of its nodes,
+    /// less what of them is a linear field, each as stiff as E times what CalculiX takes (Flanagan
+    /// and Belytschko 1981).
+    fn hourglass(&self, warmth: &Warmth, k: &mut [f64]) -> Result<(), Folded> {
+        let (slopes, volume) = self.mean()?;
+        let warm = warmth.now.iter().sum::<f64>() / warmth.now.len() as f64;
+        let young = match &self.material.elastic {
+            Some(Elastic::Isotropic(table)) => table.at(warm)[0],
+            Some(other) => other.stiffness(warm)[0][0],
+            None => 0.0,
+        };
+        let slopes: Vec<DVec3> = slopes.into_iter().map(DVec3::from_array).collect();
+        let squares: f64 = slopes.iter().map(|slope| slope.length_squared()).sum();
+        let stiffness = HOURGLASS * young * volume * squares;
+        for pattern in patterns() {
+            let linear: DVec3 = pattern.iter().zip(&self.places).map(|(p, &x)| *p * x).sum();
+            let own: Vec<f64> =
+                pattern.iter().zip(&slopes).map(|(p, slope)| p - linear.dot(*slope)).collect();
+            for (a, b) in pairs(own.len()) {
+                let value = stiffness * own[a] * own[b];
+                (0..3).for_each(|i| k[(3 * a + i) * 3 * own.len() + 3 * b + i] += value);
+            }
+        }
+        Ok(())
+    }
+
     /// K, row by row, and the forces of what strains it: warmth of the nodes and stress that it
     /// has from the beginning.
     pub(super) fn stiffness(
@@ -166,6 +230,9 @@ impl<'a> Element<'a> {
         k: &mut [f64],
         f: &mut [f64],
     ) -> Result<(), Folded> {
+        if self.cell.shape == Shape::Hex8Mean {
+            self.hourglass(warmth, k)?;
+        }
         match self.summed(warmth, &initial, k, f)? {
             Some((all, forces)) => condensed(&all, &forces, k, f),
             None => Ok(()),
@@ -188,7 +255,7 @@ impl<'a> Element<'a> {
         let (k, f) =
             if has_bubbles { (all.0.as_mut_slice(), all.1.as_mut_slice()) } else { (k, f) };
         for (p, (natural, weight)) in self.points().into_iter().enumerate() {
-            let at = self.bubbled(natural, weight)?;
+            let at = self.strained(natural, weight)?;
             let (law, free) = self.local(p, &at, warmth);
             let stress = tensor::sub(&tensor::apply(&law, &free), &initial(p));
             for a in 0..n {
@@ -250,7 +317,7 @@ impl<'a> Element<'a> {
         }
         let points = self.points().into_iter().enumerate();
         let stress = |(p, (natural, weight)): (usize, ([f64; 3], f64))| {
-            let at = self.bubbled(natural, weight)?;
+            let at = self.strained(natural, weight)?;
             let mut strain = tensor::ZERO;
             for (slope, u) in at.slopes.iter().zip(moved.as_chunks::<3>().0) {
                 let parts = strains(slope);
@@ -474,7 +541,7 @@ impl<'a> Element<'a> {
         f: &mut [f64],
     ) -> Result<(), Folded> {
         for (natural, weight) in self.points() {
-            let at = self.at(natural, weight)?;
+            let at = self.strained(natural, weight)?;
             let force = at.volume * density(&at);
             for (jet, f) in at.jets.iter().zip(f.as_chunks_mut::<3>().0) {
                 f.iter_mut().zip(force.to_array()).for_each(|(f, q)| *f += jet.value * q);
@@ -609,6 +676,28 @@ fn inverse_transposed([a, b, c]: &[DVec3; 3]) -> Option<[DVec3; 3]> {
     let determinant = a.dot(b.cross(*c));
     let upright = determinant > 0.0 && determinant.is_finite();
     upright.then(|| [b.cross(*c), c.cross(*a), a.cross(*b)].map(|v| v / determinant))
+}
+
+/// Stiffness against hourglasses over E Σ|b|² V, b being the mean slopes.
+const HOURGLASS: f64 = 0.0005;
+
+/// ηζ, ζξ, ξη and ξηζ at the nodes of a brick.
+fn patterns() -> [[f64; 8]; 4] {
+    let places = face_places(4);
+    let products = |i: usize| {
+        let ([x, y], z) = (places[i % 4], if i < 4 { -1.0 } else { 1.0 });
+        [y * z, z * x, x * y, x * y * z]
+    };
+    std::array::from_fn(|p| std::array::from_fn(|i| products(i)[p]))
+}
+
+/// A law of stress along one direction alone.
+fn uniaxial(law: &Tangent, along: DVec3) -> Tangent {
+    let [x, y, z] = along.to_array();
+    let stress = Vector6::new(x * x, y * y, z * z, x * y, y * z, z * x);
+    let strain = Matrix6::from_fn(|i, j| law[i][j]).cholesky().map(|law| law.solve(&stress));
+    let young = strain.map_or(0.0, |strain| 1.0 / stress.dot(&strain));
+    std::array::from_fn(|i| std::array::from_fn(|j| young * stress[i] * stress[j]))
 }
 
 /// The corners of a cube in the order of its eight points of integration.

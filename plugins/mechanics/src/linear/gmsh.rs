@@ -254,6 +254,7 @@ impl<'a> Builder<'a> {
                 nodes: element.nodes.clone(),
                 material,
                 orientation: None,
+                across: 0.0,
                 points: Vec::new(),
                 layers: Vec::new(),
             });

@@ -16,9 +16,19 @@ use super::{
     law::Table,
     model::{Cell, Deck, Heated, Heating, Step},
     modes::{self, Failed},
+    shape::Shape,
     solve::{LinearError, Solved},
 };
 use crate::sparse::{BlockMatrix, Constraints, Method, SolveError, solve as direct};
+
+/// The shape whose points heat is asked at: the one of C3D8R would leave temperatures open that
+/// alternate from node to node.
+fn warmed(element: &Element<'_>) -> Shape {
+    match element.shape() {
+        Shape::Hex8Mean => Shape::Hex8,
+        shape => shape,
+    }
+}
 
 /// Newton's steps; fewer than ten where nothing but radiation is nonlinear.
 const STEPS: usize = 200;
@@ -229,7 +239,7 @@ impl<'a> Body<'a> {
         let n = own.len();
         let loads = self.loads.get(&(e as u32)).map_or(&[][..], Vec::as_slice);
         let volume: f64 = loads.iter().filter(|l| l.0.0 == Heating::Volume).map(|l| l.1[0]).sum();
-        for (natural, weight) in element.shape().points() {
+        for (natural, weight) in warmed(&element).points() {
             let at = element.at(natural, weight)?;
             let here = at.value(&own);
             let law = element.material().conductivity.as_ref();
@@ -302,7 +312,7 @@ impl<'a> Body<'a> {
     fn capacity(&self, e: usize, all: &[f64], m: &mut [f64]) -> Result<(), Folded> {
         let (element, own) = (Element::new(self.deck, self.step, e), self.own(e, all));
         let n = own.len();
-        for (natural, weight) in element.shape().fine_points() {
+        for (natural, weight) in warmed(&element).fine_points() {
             let at = element.at(natural, weight)?;
             let here = at.value(&own);
             let heat = element.material().specific_heat.as_ref().map_or(0.0, |c| c.at(here)[0]);

@@ -26,12 +26,14 @@ pub(super) fn kind(name: &str) -> Option<Kind> {
     let solid = match name {
         "C3D8" => Some(Shape::Hex8),
         "C3D8I" => Some(Shape::Hex8Bubbles),
+        "C3D8R" => Some(Shape::Hex8Mean),
         "C3D20" => Some(Shape::Hex20),
         "C3D20R" => Some(Shape::Hex20Reduced),
         "C3D4" => Some(Shape::Tet4),
         "C3D10" => Some(Shape::Tet10),
         "C3D6" => Some(Shape::Wedge6),
         "C3D15" => Some(Shape::Wedge15),
+        "T3D2" => Some(Shape::Bar),
         _ => None,
     };
     if let Some(shape) = solid {
@@ -294,7 +296,11 @@ impl Reader {
             let cell = match raw.kind {
                 Kind::Link(_) => continue,
                 Kind::Thin(thin) => self.thickened(i as u32, thin, section),
-                Kind::Solid(shape) => whole(raw, shape, raw.nodes.clone(), section),
+                Kind::Solid(shape) => {
+                    // Of a bar the first number is an area: it came as a length.
+                    let across = section.thickness * self.units.length();
+                    Cell { across, ..whole(raw, shape, raw.nodes.clone(), section) }
+                }
                 Kind::Flat(flat) => {
                     let deck = &mut self.deck;
                     let thickness = share * section.thickness;
@@ -336,6 +342,7 @@ fn whole(raw: &Raw, shape: Shape, nodes: Vec<u32>, section: &Section) -> Cell {
         nodes,
         material: section.material,
         orientation: section.orientation,
+        across: 0.0,
         points: Vec::new(),
         layers: Vec::new(),
     }

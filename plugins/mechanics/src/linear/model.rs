@@ -69,6 +69,8 @@ pub(super) struct Cell {
     pub(super) nodes: Vec<u32>,
     pub(super) material: u32,
     pub(super) orientation: Option<u32>,
+    /// Section of a bar, m².
+    pub(super) across: f64,
     /// Points of integration, where they are not those of its shape.
     pub(super) points: Vec<Point>,
     /// Material and axes at every point, where they differ.

@@ -43,12 +43,16 @@ const CONTROLS: &str = "CONTROLS";
 const CONTACT: [&str; 3] = ["SURFACEINTERACTION", "SURFACEBEHAVIOR", "FRICTION"];
 
 /// Whether a deck has something in it that the reader of decks for members does not know, and so
-/// this one is asked.
+/// this one is asked; concrete that cracks is known to that one alone.
 #[must_use]
 pub fn concerns(bytes: &[u8]) -> bool {
     let Ok(cards) = abaqus::text(bytes).and_then(cards) else { return false };
+    if cards.iter().any(|card| card.is("CONCRETE DAMAGED PLASTICITY")) {
+        return false;
+    }
     cards.iter().any(|card| {
         !abaqus::knows(card)
+            || card.is("PLASTIC")
             || card.get("ORIENTATION").is_some()
             || (card.is("STEP") && card.word("NLGEOM").is_some_and(|word| word != "NO"))
             || (card.is("ELEMENT")

@@ -10,6 +10,8 @@ pub(super) enum Shape {
     Hex8,
     /// C3D8I: as [`Shape::Hex8`] with bubbles that let it bend.
     Hex8Bubbles,
+    /// C3D8R: as [`Shape::Hex8`] with the mean strain of its volume.
+    Hex8Mean,
     /// C3D20.
     Hex20,
     /// C3D20R: as [`Shape::Hex20`] with eight points.
@@ -22,6 +24,8 @@ pub(super) enum Shape {
     Wedge6,
     /// C3D15.
     Wedge15,
+    /// T3D2: a bar between two nodes.
+    Bar,
 }
 
 /// A value with its derivatives by the three natural coordinates.
@@ -159,7 +163,8 @@ impl Shape {
     /// How many nodes it has.
     pub(super) fn nodes(self) -> usize {
         match self {
-            Self::Hex8 | Self::Hex8Bubbles => 8,
+            Self::Bar => 2,
+            Self::Hex8 | Self::Hex8Bubbles | Self::Hex8Mean => 8,
             Self::Hex20 | Self::Hex20Reduced => 20,
             Self::Tet4 => 4,
             Self::Tet10 => 10,
@@ -171,7 +176,8 @@ impl Shape {
     /// VTK's number for cells of its nodes, which has them in the same order.
     pub(super) fn vtk(self) -> u8 {
         match self {
-            Self::Hex8 | Self::Hex8Bubbles => 12,
+            Self::Bar => 3,
+            Self::Hex8 | Self::Hex8Bubbles | Self::Hex8Mean => 12,
             Self::Hex20 | Self::Hex20Reduced => 25,
             Self::Tet4 => 10,
             Self::Tet10 => 24,
@@ -184,7 +190,8 @@ impl Shape {
     pub(super) fn functions(self, at: [f64; 3]) -> Vec<Jet> {
         let x = coordinates(at);
         match self {
-            Self::Hex8 | Self::Hex8Bubbles => {
+            Self::Bar => vec![(Jet::of(1.0) - x[0]) * 0.5, (x[0] + 1.0) * 0.5],
+            Self::Hex8 | Self::Hex8Bubbles | Self::Hex8Mean => {
                 BRICK[..8].iter().map(|n| corner(x, *n) * 0.125).collect()
             }
             Self::Hex20 | Self::Hex20Reduced => BRICK.iter().map(|n| serendipity(x, *n)).collect(),
@@ -199,6 +206,8 @@ impl Shape {
     /// Points of integration over its volume, in the order in which stresses are given.
     pub(super) fn points(self) -> Vec<Point> {
         match self {
+            Self::Bar => vec![([0.0; 3], 2.0)],
+            Self::Hex8Mean => vec![([0.0; 3], 8.0)],
             Self::Hex8 | Self::Hex8Bubbles | Self::Hex20Reduced => cube(&GAUSS_2),
             Self::Hex20 => cube(&GAUSS_3),
             Self::Tet4 => vec![([0.25; 3], 1.0 / 6.0)],
@@ -214,9 +223,12 @@ impl Shape {
     }
 
     /// Points for masses and stored heat: they integrate the square of its functions where it is
-    /// not distorted, but for C3D20R, which CalculiX weighs at the points of its stiffness.
+    /// not distorted, but for C3D8R and C3D20R, which CalculiX weighs at the points of their
+    /// stiffness.
     pub(super) fn fine_points(self) -> Vec<Point> {
         match self {
+            Self::Bar => GAUSS_2.iter().map(|&(a, w)| ([a, 0.0, 0.0], w)).collect(),
+            Self::Hex8Mean => self.points(),
             Self::Hex8 | Self::Hex8Bubbles | Self::Hex20Reduced => cube(&GAUSS_2),
             Self::Hex20 => cube(&GAUSS_3),
             Self::Tet4 => Self::Tet10.points(),
@@ -234,7 +246,8 @@ impl Shape {
     /// Nodes of each of its faces, counterclockwise from outside, corners first.
     pub(super) fn faces(self) -> impl ExactSizeIterator<Item = &'static [usize]> {
         let (all, quadratic): (&'static [&'static [usize]], bool) = match self {
-            Self::Hex8 | Self::Hex8Bubbles => (&BRICK_FACES, false),
+            Self::Bar => (&[], false),
+            Self::Hex8 | Self::Hex8Bubbles | Self::Hex8Mean => (&BRICK_FACES, false),
             Self::Hex20 | Self::Hex20Reduced => (&BRICK_FACES, true),
             Self::Tet4 => (&TET_FACES, false),
             Self::Tet10 => (&TET_FACES, true),
@@ -253,7 +266,7 @@ impl Shape {
         match (self, nodes) {
             (_, 3) => TRIANGLE_1.to_vec(),
             (_, 6) => TRIANGLE_3.to_vec(),
-            (Self::Wedge6, _) => vec![([0.0; 2], 4.0)],
+            (Self::Wedge6 | Self::Hex8Mean, _) => vec![([0.0; 2], 4.0)],
             (Self::Hex20, _) => square(&GAUSS_3),
             _ => square(&GAUSS_2),
         }
@@ -394,9 +407,11 @@ fn prism(triangle: &[([f64; 2], f64)], g: &[(f64, f64)]) -> Vec<Point> {
 mod tests {
     use super::*;
 
-    const ALL: [Shape; 8] = [
+    const ALL: [Shape; 10] = [
+        Shape::Bar,
         Shape::Hex8,
         Shape::Hex8Bubbles,
+        Shape::Hex8Mean,
         Shape::Hex20,
         Shape::Hex20Reduced,
         Shape::Tet4,
@@ -433,18 +448,25 @@ mod tests {
             let expected = match shape {
                 Shape::Tet4 | Shape::Tet10 => 1.0 / 6.0,
                 Shape::Wedge6 | Shape::Wedge15 => 1.0,
+                Shape::Bar => 2.0,
                 _ => 8.0,
             };
             assert!((volume - expected).abs() < 1e-14, "{shape:?}");
             // ∫ N Nᵀ of the square of a function, by points of another rule: x⁴ is of its degree.
             let is_fine = shape.nodes() > 8 && shape != Shape::Hex20Reduced;
-            let degree = if is_fine { 4 } else { 2 };
+            let degree = match shape {
+                Shape::Hex8Mean => 0,
+                _ if is_fine => 4,
+                _ => 2,
+            };
             let power: f64 = shape.fine_points().iter().map(|p| p.1 * p.0[0].powi(degree)).sum();
             let exact = match (shape, degree) {
                 (Shape::Tet4, _) => 2.0 / 120.0,
                 (Shape::Tet10, _) => 24.0 / 5040.0,
                 (Shape::Wedge6, _) => 4.0 / 24.0,
                 (Shape::Wedge15, _) => 48.0 / 720.0,
+                (Shape::Bar, _) => 2.0 / 3.0,
+                (_, 0) => 8.0,
                 (_, 2) => 8.0 / 3.0,
                 _ => 8.0 / 5.0,
             };

@@ -382,11 +382,16 @@ impl Reader {
 
     /// Every element is known where displacements are large.
     fn turns(&self) -> Result<(), Fault> {
-        match self.raw.iter().find(|raw| raw.kind == Kind::Link(Link::Damper)) {
+        let lacks = |kind: Kind| match kind {
+            Kind::Solid(Shape::Hex8Mean | Shape::Bar) => Some("C3D8R and T3D2"),
+            Kind::Link(Link::Damper) => Some("dashpots"),
+            _ => None,
+        };
+        match self.raw.iter().find_map(|raw| Some((raw, lacks(raw.kind)?))) {
             None => Ok(()),
-            Some(raw) => {
-                let why = "dashpots are not computed where displacements are large (NLGEOM)";
-                Err(Fault::at(raw.line, format!("element {}: {why}", raw.label)))
+            Some((raw, what)) => {
+                let why = "are not computed where displacements are large (NLGEOM)";
+                Err(Fault::at(raw.line, format!("element {}: {what} {why}", raw.label)))
             }
         }
     }

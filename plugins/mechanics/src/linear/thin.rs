@@ -423,6 +423,7 @@ impl Reader {
             nodes: thin.solid(&rings),
             material: section.material,
             orientation: section.orientation,
+            across: 0.0,
             points,
             layers: materials,
         }

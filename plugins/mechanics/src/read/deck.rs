@@ -61,6 +61,39 @@ pub struct Material {
     pub conductivity: Option<f64>,
     /// J/(kg·K).
     pub specific_heat: Option<f64>,
+    /// Stress (Pa) over plastic strain of a metal; empty: it does not yield.
+    pub(crate) yielding: Vec<(f64, f64)>,
+    /// Of a concrete that cracks; none: it does not.
+    pub(crate) concrete: Option<Concrete>,
+}
+
+/// What Abaqus' cards of damaged plasticity say of a concrete.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(crate) struct Concrete {
+    /// Where the file says it.
+    pub line: u32,
+    /// Compressive stress (Pa, positive) over inelastic strain.
+    pub hardening: Vec<(f64, f64)>,
+    /// Tension past its strength.
+    pub stiffening: Option<Stiffening>,
+    /// Whether tables of damage say what unloading costs.
+    pub damage: bool,
+}
+
+/// What a crack still bears, by stresses in Pa.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Stiffening {
+    /// Over its strain.
+    Strain(Vec<(f64, f64)>),
+    /// Over its opening, m.
+    Opening(Vec<(f64, f64)>),
+    /// From a strength down to nothing.
+    Energy {
+        /// Pa.
+        strength: f64,
+        /// G_f, J/m².
+        energy: f64,
+    },
 }
 
 /// What a region is made of.

@@ -20,8 +20,8 @@ use std::{
 use intrados_stage::access::{self, Denied};
 
 pub(crate) use deck::{
-    Amplitude, Body, Deck, Embedded, Fixed, Formulation, InitialStress, Load, Material,
-    ModelChange, Pressure, Section, SectionKind, Step, Temperature,
+    Amplitude, Body, Concrete, Deck, Embedded, Fixed, Formulation, InitialStress, Load, Material,
+    ModelChange, Pressure, Section, SectionKind, Step, Stiffening, Temperature,
 };
 
 /// The largest file that is read, bytes.

@@ -7,6 +7,7 @@
 //! |---|---|
 //! | mesh | `*NODE` (also `SYSTEM=C`), `*ELEMENT` (C3D8, C3D8I, C3D8R, T3D2, S4, S4R), `*NSET`, `*ELSET` (also `GENERATE`), `*SURFACE` |
 //! | materials | `*MATERIAL`, `*ELASTIC`, `*DENSITY`, `*EXPANSION`, `*CONDUCTIVITY`, `*SPECIFIC HEAT`, `*SOLID SECTION`, `*SHELL SECTION` |
+//! | concrete that cracks | `*CONCRETE DAMAGED PLASTICITY` with `*CONCRETE COMPRESSION HARDENING`, `*CONCRETE TENSION STIFFENING`, and tables of damage, which are not heeded; `*PLASTIC` of bars |
 //! | state | `*INITIAL CONDITIONS` (`STRESS`, `TEMPERATURE`), `*EMBEDDED ELEMENT`, `*AMPLITUDE` |
 //! | steps | `*STEP`, `*STATIC`, `*BOUNDARY`, `*CLOAD`, `*DLOAD` (P, P1–P6, GRAV), `*DSLOAD` (P),
 //! `*TEMPERATURE`, `*MODEL CHANGE`, `*END STEP` |
@@ -16,6 +17,7 @@
 //! becomes ours.
 
 pub(crate) mod card;
+mod concrete;
 mod load;
 mod model;
 mod property;
@@ -31,7 +33,8 @@ use card::{Card, cards};
 
 /// Every card that is understood, for messages.
 const SUPPORTED: &str = "*NODE, *ELEMENT, *NSET, *ELSET, *SURFACE, *MATERIAL, *ELASTIC, *DENSITY, *EXPANSION, *CONDUCTIVITY, \
-    *SPECIFIC HEAT, *SOLID SECTION, *SHELL SECTION, *AMPLITUDE, *INITIAL CONDITIONS, *EMBEDDED ELEMENT, *BOUNDARY, *CLOAD, *DLOAD, \
+    *SPECIFIC HEAT, *PLASTIC, *CONCRETE DAMAGED PLASTICITY, *CONCRETE COMPRESSION HARDENING, *CONCRETE TENSION STIFFENING, \
+    *CONCRETE COMPRESSION DAMAGE, *CONCRETE TENSION DAMAGE, *SOLID SECTION, *SHELL SECTION, *AMPLITUDE, *INITIAL CONDITIONS, *EMBEDDED ELEMENT, *BOUNDARY, *CLOAD, *DLOAD, \
     *DSLOAD, *TEMPERATURE, *MODEL CHANGE, *STEP, *STATIC, *END STEP and cards of output";
 
 /// Cards that only concern what is printed.

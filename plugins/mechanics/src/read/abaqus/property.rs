@@ -1,10 +1,14 @@
 //! Materials, sections, amplitudes.
 
-use super::{Card, Fault, Reader};
+use super::{Card, Fault, Reader, concrete};
 use crate::{
     mesh::ElementId,
     read::{Amplitude, Material, Section, SectionKind, quote},
 };
+
+/// What a material is said to be, beside concrete that cracks.
+const PROPERTIES: [&str; 6] =
+    ["ELASTIC", "DENSITY", "EXPANSION", "CONDUCTIVITY", "SPECIFIC HEAT", "PLASTIC"];
 
 impl Reader {
     /// Materials and amplitudes. A property belongs to the material before it.
@@ -26,12 +30,18 @@ impl Reader {
                     self.deck.materials.push(Material { name, ..Material::default() });
                     open = true;
                 }
-                "ELASTIC" | "DENSITY" | "EXPANSION" | "CONDUCTIVITY" | "SPECIFIC HEAT" => {
+                name if PROPERTIES.contains(&name) || concrete::concerns(card) => {
                     let material = self.deck.materials.last_mut().filter(|_| open);
                     let material = material.ok_or_else(|| {
                         card.fault(format!("*{} must stand under a *MATERIAL", card.name))
                     })?;
-                    property(card, material, self.units)?;
+                    match name {
+                        "PLASTIC" => yielding(card, material, self.units)?,
+                        _ if concrete::concerns(card) => {
+                            concrete::read(card, material, self.units)?
+                        }
+                        _ => property(card, material, self.units)?,
+                    }
                 }
                 "AMPLITUDE" => {
                     self.amplitude(card)?;
@@ -40,7 +50,7 @@ impl Reader {
                 _ => open = false,
             }
         }
-        Ok(())
+        self.deck.materials.iter().try_for_each(concrete::is_whole)
     }
 
     fn amplitude(&mut self, card: &Card<'_>) -> Result<(), Fault> {
@@ -188,6 +198,30 @@ impl Reader {
             }
             None => Ok(()),
         }
+    }
+}
+
+/// Of a metal: stress over plastic strain, from where it yields.
+fn yielding(
+    card: &Card<'_>,
+    material: &mut Material,
+    units: crate::read::Units,
+) -> Result<(), Fault> {
+    card.only(&["HARDENING"])?;
+    if card.word("HARDENING").is_some_and(|word| word != "ISOTROPIC") {
+        return Err(card.fault("*PLASTIC beside concrete: only HARDENING=ISOTROPIC is supported"));
+    }
+    let points = concrete::table(card, ["stress", "plastic strain"], [units.stress(), 1.0])?;
+    if let Some(fall) = points.windows(2).find(|pair| pair[1].0 < pair[0].0) {
+        return Err(card.fault(format!(
+            "*PLASTIC: its stress falls at a plastic strain of {}; bars may harden, not soften",
+            fall[1].1
+        )));
+    }
+    if std::mem::replace(&mut material.yielding, points).is_empty() {
+        Ok(())
+    } else {
+        Err(card.fault(format!("material {} has *PLASTIC already", material.name)))
     }
 }
 

@@ -3,7 +3,7 @@ use std::fmt::Write as _;
 use intrados_stage::random::Key;
 
 use super::*;
-use crate::read::{Fixed, Formulation, Load, Pressure, SectionKind};
+use crate::read::{Fixed, Formulation, Load, Pressure, SectionKind, Stiffening};
 
 fn parse_text(text: &str) -> Result<Deck, String> {
     parse(text.as_bytes(), Path::new("a.inp"), Units::MetreNewton).map_err(|e| e.to_string())
@@ -446,4 +446,56 @@ fn mutated_decks_never_panic() {
         }
     }
     assert!(accepted > 200 && refused > 2000, "{accepted} {refused}");
+}
+
+/// A concrete of Abaqus' damaged plasticity, in mm and N.
+const DAMAGED: &str = "*CONCRETE DAMAGED PLASTICITY\n36., 0.1, 1.16, , 1e-5\n*CONCRETE COMPRESSION HARDENING\n12., 0.\n30., 1e-3\n3., 1e-2\n\
+    *CONCRETE TENSION STIFFENING, TYPE=DISPLACEMENT\n3., 0.\n1., .05\n0., .2\n*CONCRETE COMPRESSION DAMAGE\n0., 0.\n.9, 1e-2\n\
+    *CONCRETE TENSION DAMAGE, TYPE=DISPLACEMENT\n0., 0.\n.95, .2\n";
+
+fn damaged(text: &str) -> Result<Deck, String> {
+    let deck = cantilever(1).replace("*SOLID", &format!("{text}*SOLID"));
+    parse(deck.as_bytes(), Path::new("a.inp"), Units::MillimetreNewton).map_err(|e| e.to_string())
+}
+
+#[test]
+fn damaged_plasticity_is_read() {
+    let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-9 * b.abs().max(1e-9), "{a} {b}");
+    let concrete = |deck: Deck| deck.materials[0].concrete.clone().unwrap();
+    let read = concrete(damaged(DAMAGED).unwrap());
+    assert_eq!((read.hardening.len(), read.damage), (3, true));
+    near(read.hardening[1].0, 30e6);
+    let Some(Stiffening::Opening(points)) = read.stiffening else { panic!() };
+    near(points[1].0, 1e6);
+    near(points[1].1, 5e-5);
+    let table = "TYPE=DISPLACEMENT\n3., 0.\n1., .05\n0., .2\n";
+    let read = concrete(damaged(&DAMAGED.replace(table, "TYPE=GFI\n3., .1\n")).unwrap());
+    let Some(Stiffening::Energy { strength, energy }) = read.stiffening else { panic!() };
+    near(strength, 3e6);
+    near(energy, 100.0);
+    let read = concrete(damaged(&DAMAGED.replace(table, "TYPE=STRAIN\n3.,0.\n.3,2e-3\n")).unwrap());
+    assert_eq!(read.stiffening, Some(Stiffening::Strain(vec![(3e6, 0.0), (0.3 * 1e6, 2e-3)])));
+}
+
+/// Every fault is named with its line.
+#[test]
+fn tables_of_concrete_that_say_nothing_are_refused() {
+    for (from, to, reason) in [
+        ("*CONCRETE DAMAGED PLASTICITY\n36., 0.1, 1.16, , 1e-5\n", "", "must stand below"),
+        ("12., 0.\n", "12., 1e-4\n", "inelastic strain 0"),
+        ("3., 1e-2\n", "3., 1e-3\n", "must grow"),
+        ("3., 1e-2\n", "3., 1e-2, 0., 20.\n", "no rate and no temperature"),
+        ("30., 1e-3\n", "-30., 1e-3\n", "must not be negative"),
+        ("1., .05\n", "4., .05\n", "grows up to cracking displacement"),
+        ("TYPE=DISPLACEMENT\n3., 0.\n", "TYPE=WIDTH\n3., 0.\n", "STRAIN, DISPLACEMENT and GFI"),
+        (".9, 1e-2\n", "1.9, 1e-2\n", "a damage of 1.9"),
+        ("36., 0.1, 1.16, , 1e-5\n", "36., 0.1, 1.16, .6, 0., 20.\n", "at most five numbers"),
+        ("12., 0.\n30., 1e-3\n3., 1e-2\n", "", "has no data"),
+    ] {
+        let why = damaged(&DAMAGED.replacen(from, to, 1)).unwrap_err();
+        assert!(why.contains(reason) && why.starts_with("a.inp:"), "{why} / {reason}");
+    }
+    let alone = DAMAGED.split("*CONCRETE TENSION STIFFENING").next().unwrap();
+    assert!(damaged(alone).unwrap_err().contains("needs *CONCRETE TENSION STIFFENING"));
+    assert!(damaged(&format!("{DAMAGED}{DAMAGED}")).unwrap_err().contains("already"));
 }
