@@ -354,7 +354,7 @@ impl<'a> Element<'a> {
         initial: &impl Fn(usize) -> Voigt,
         flow: &[Flow],
     ) -> Result<Stretched, Folded> {
-        let mut at = self.bubbled(natural, weight)?;
+        let mut at = self.strained(natural, weight)?;
         let (law, free) = self.local(p, &at, warmth);
         let metal = self.metal(p, self.warmth(p, &at, warmth)[0]);
         let swelling = swelling(&free);

@@ -12,6 +12,7 @@ use super::{
     matter::all_numbers,
     model::{Course, Damping, Heated, Material, Procedure, Pull, Spring, Step},
     read::{Kind, Raw, Reader, Surface, plain},
+    shape::Shape,
     thin::Thin,
     tie::{self, Face},
     warm::is_temperature,
