@@ -44,8 +44,16 @@ pub(crate) fn members_csv(prediction: &Prediction) -> String {
         "true_damage [1]",
         "true_state",
         "truth",
+        "graded_by",
+        "raised_loads",
+        "load_factor [1]",
+        "load_factor_std_error [1]",
+        "fails_by",
+        "strength_cost [1]",
+        "strength_cost_std_error [1]",
     ]);
     for m in &prediction.members {
+        let borne = m.capacity.as_ref();
         let width = m.evidence.values().filter_map(|e| e.crack_width_mm).reduce(f64::max);
         let kind = serde_json::to_value(m.kind)
             .ok()
@@ -77,6 +85,13 @@ pub(crate) fn members_csv(prediction: &Prediction) -> String {
             number(m.truth.as_ref().map(|t| t.damage)),
             m.truth.as_ref().map(|t| t.state.clone()).unwrap_or_default(),
             m.truth.as_ref().map(|t| t.origin.to_owned()).unwrap_or_default(),
+            if m.by_strength { "strength" } else { "worst zone" }.to_owned(),
+            borne.map(|c| c.loads.join("; ")).unwrap_or_default(),
+            number(borne.map(|c| c.load_factor.value)),
+            number(borne.map(|c| c.load_factor.std_error)),
+            borne.map(|c| c.mode.words().to_owned()).unwrap_or_default(),
+            number(borne.map(|c| c.cost.value)),
+            number(borne.map(|c| c.cost.std_error)),
         ]);
     }
     table.text()

@@ -4,9 +4,10 @@
 
 use intrados_damage::{Cause, Sources, verdict::Basis};
 use intrados_forecast as forecast;
+use intrados_mechanics::strength::Mode;
 use intrados_predict::{PredictSettings, Prediction, predict};
 use intrados_scene::{Scene, parametric::template};
-use intrados_stage::Job;
+use intrados_stage::{Estimate, Job};
 
 /// The template's column in another exposure, on few bricks.
 fn predicted(exposure: &str) -> (Scene, Prediction) {
@@ -33,7 +34,7 @@ fn predicted(exposure: &str) -> (Scene, Prediction) {
 /// XD3 without chloride was "no corrosion, 0 % rusted away", and its state "sound, no action".
 #[test]
 fn salt_without_numbers_is_assumed_with_its_spread() {
-    let (scene, prediction) = predicted("exposure: (class: \"XC4, XD3\", years: 30)");
+    let (scene, mut prediction) = predicted("exposure: (class: \"XC4, XD3\", years: 30)");
     let member = &prediction.members[0];
     assert_eq!(member.basis, Basis::Forecast);
     assert!(member.state.starts_with("forecast: between"), "{}", member.state);
@@ -52,6 +53,16 @@ fn salt_without_numbers_is_assumed_with_its_spread() {
     );
     assert!(evidence.details["rust"]["depassivation_years"].as_f64().unwrap() < 30.0);
     its_course_passes_what_is_foretold(&evidence.details);
+    // As if somebody had asked what it bears.
+    let known = |value, std_error| Estimate { value, std_error };
+    prediction.members[0].capacity = Some(forecast::Capacity {
+        loads: vec!["jack".into()],
+        load_factor: known(2.5, 0.25),
+        sound: 3.0,
+        cost: known(0.125, 0.0625),
+        mode: Mode::DiagonalTension,
+        because: "a crack opens".into(),
+    });
     let folder = tempfile::tempdir().unwrap();
     let mut document = intrados_report::Document::of(&scene, prediction);
     intrados_report::write(
@@ -79,6 +90,9 @@ fn salt_without_numbers_is_assumed_with_its_spread() {
         read("members.csv").contains(",forecast,")
             && read("members.csv").contains("assumed by exposure class")
     );
+    let borne = ",worst zone,jack,2.5,0.25,diagonal tension,0.125,0.0625\r\n";
+    assert!(read("members.csv").ends_with(borne), "{}", read("members.csv"));
+    assert!(read("report.html").contains("bears 2.50 ± 0.25 times jack"));
     assert!(read("damage.vtu").contains("measured"));
     assert!(read("damage.vtu").contains(&format!("scene hash {}", scene.hash)));
     let json: serde_json::Value = serde_json::from_str(&read("predict.json")).unwrap();

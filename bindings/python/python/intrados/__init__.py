@@ -9,12 +9,28 @@
 from ._detect import Crack, Pore, Slice, detect
 from ._errors import Error, InputError, MissingError, UsageError, WriteError
 from ._intrados import __version__
-from ._reports import Analysis, Estimate, Evidence, Measurement, MemberLife, MemberPrediction, Prediction, Reading, Report, Zone
+from ._reports import (
+    Analysis,
+    Capacity,
+    CurvePoint,
+    Estimate,
+    Evidence,
+    Measurement,
+    MemberLife,
+    MemberPrediction,
+    Prediction,
+    Reading,
+    Report,
+    Strength,
+    Zone,
+)
 from ._scene import Member, Scene, load
 
 __all__ = [
     "Analysis",
+    "Capacity",
     "Crack",
+    "CurvePoint",
     "Error",
     "Estimate",
     "Evidence",
@@ -30,6 +46,7 @@ __all__ = [
     "Report",
     "Scene",
     "Slice",
+    "Strength",
     "UsageError",
     "WriteError",
     "Zone",

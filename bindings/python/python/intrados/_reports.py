@@ -61,6 +61,23 @@ class Estimate:
 
 
 @dataclass(frozen=True)
+class Capacity:
+    """What a member bears: ``predict(strength=True)``."""
+
+    loads: tuple[str, ...]
+    """Which were raised."""
+    load_factor: Estimate
+    """How many times these it bears with what is known of its damage; at least so many where it did not fail."""
+    sound: float
+    """How many times it would bear them if it were sound."""
+    cost: Estimate
+    """Share of its strength that its damage costs."""
+    mode: str
+    """How it fails: ``Yielding``, ``DiagonalTension`` …, ``None`` as a word where it did not."""
+    because: str
+
+
+@dataclass(frozen=True)
 class Zone:
     """A tenth of a member's length. Of what nobody knows anything, damage and error are ``None``."""
 
@@ -85,7 +102,7 @@ class Evidence:
 
 @dataclass(frozen=True)
 class MemberPrediction:
-    """Damage of a member: the share of strength lost in its worst zone."""
+    """Damage of a member: the share of strength lost in its worst zone, or what that costs all of it (``by_strength``)."""
 
     id: str
     name: str
@@ -99,7 +116,11 @@ class MemberPrediction:
     within_months: int | None
     """How soon that should be done."""
     states: Mapping[str, float]
-    """Probability of each state."""
+    """By state, the share of its length that is to be expected in it; by strength, the probability of each."""
+    by_strength: bool
+    """Whether it is graded by what its damage costs of its strength, as the profile may want."""
+    capacity: Capacity | None
+    """What it bears; ``None`` where nobody asked or nothing can be raised."""
     zones: tuple[Zone, ...]
     evidence: tuple[Evidence, ...]
     conflicts: tuple[str, ...]
@@ -181,6 +202,40 @@ class Measurement(Report):
 
 
 @dataclass(frozen=True)
+class CurvePoint:
+    """An equilibrium while loads are raised."""
+
+    displacement_m: float
+    """Mean displacement of the loaded nodes along their loads."""
+    load_factor: float
+    """1 is what the scene writes."""
+    load_n: float
+
+
+@dataclass(frozen=True)
+class Strength:
+    """What a member bears: ``analyze(to_failure=True)``."""
+
+    loads: tuple[str, ...]
+    """Which were raised."""
+    displacement_m: np.ndarray
+    """The curve, equilibrium by equilibrium."""
+    load_factor: np.ndarray
+    load_n: np.ndarray
+    peak: CurvePoint
+    yielding: CurvePoint | None
+    """Where a bar, no stirrup, yields first."""
+    ultimate: CurvePoint | None
+    """Where a fifth of the peak is lost."""
+    ductility: float | None
+    mode: str
+    """How it fails: ``Yielding``, ``DiagonalTension`` …, ``None`` as a word where it did not."""
+    because: str
+    ended: str
+    """Why it was followed no further."""
+
+
+@dataclass(frozen=True)
 class MemberLife:
     """A member through its load history. Times in s, lengths in m, stresses in Pa."""
 
@@ -200,6 +255,8 @@ class MemberLife:
     warnings: tuple[str, ...]
     notes: tuple[str, ...]
     """Which values were taken for what is not stated, and by which rule."""
+    strength: Strength | None
+    """What it bears, where loads were raised after its life."""
 
 
 class Analysis(Report):
@@ -243,18 +300,30 @@ def _named(things, word: str):
     raise KeyError(f"there is no {word!r}: there are {names}")
 
 
+_PLAIN = ("id", "name", "kind", "damage", "state", "basis", "advice", "within_months", "states", "by_strength")
+"""What a prediction says of a member that is taken as it is."""
+
+
 def _predicted(told: dict) -> MemberPrediction:
     zones = zip(told["zones"], told["zone_basis"], strict=True)
     evidence = told["evidence"].items()
     return MemberPrediction(
-        **{key: told[key] for key in ("id", "name", "kind", "damage", "state", "basis", "advice", "within_months", "states")},
+        **{key: told[key] for key in _PLAIN},
         std_error=told["damage_std_error"],
+        capacity=_borne(told.get("capacity")),
         zones=tuple(Zone(z and z["value"], z and z["std_error"], basis) for z, basis in zones),
         evidence=tuple(
             Evidence(source, e["damage"], e["std_error"], e["measured"], e["basis"]) for source, e in evidence
         ),
         conflicts=tuple(told["conflicts"]),
     )
+
+
+def _borne(told: dict | None) -> Capacity | None:
+    if told is None:
+        return None
+    known = {key: Estimate(**told[key]) for key in ("load_factor", "cost")}
+    return Capacity(loads=tuple(told["loads"]), **known, **{key: told[key] for key in ("sound", "mode", "because")})
 
 
 def _read(told: dict) -> Reading:
@@ -284,4 +353,21 @@ def _lived(told: dict) -> MemberLife:
         complaint=told["complaint"],
         warnings=tuple(told["warnings"]),
         notes=tuple(told["notes"]),
+        strength=_raised(told.get("strength")),
+    )
+
+
+def _raised(told: dict | None) -> Strength | None:
+    if told is None:
+        return None
+    columns = tuple(CurvePoint.__dataclass_fields__)
+
+    def point(at: dict | None) -> CurvePoint | None:
+        return at and CurvePoint(**{key: at[key] for key in columns})
+
+    return Strength(
+        loads=tuple(told["loads"]),
+        **{key: np.array([at[key] for at in told["curve"]], dtype=float) for key in columns},
+        **{key: point(told[key]) for key in ("peak", "yielding", "ultimate")},
+        **{key: told[key] for key in ("ductility", "mode", "because", "ended")},
     )

@@ -105,6 +105,7 @@ class Scene:
         ahead: float | None = None,
         element: float | None = None,
         forecast: bool = True,
+        strength: bool = False,
         strict: bool = False,
         spp: int = 0,
         seed: int = 1,
@@ -112,12 +113,13 @@ class Scene:
     ) -> Prediction:
         """Damage of every member from all evidence.
 
+        ``strength``: also what each member bears (:class:`Capacity`), minutes a member.
         ``ahead`` years (20) the forecast reaches; ``element`` is the edge of its elements, m. ``spp`` samples a pixel
         are taken for the report's pictures; 0: no pictures. The report and its tables are written into ``out``, or where
         that is not given into a folder that goes when the prediction does.
         """
         options = {"profile": profile, "method": method, "ahead": ahead, "element": element, "spp": spp, "seed": seed}
-        flags = {"no-forecast": not forecast, "strict": strict}
+        flags = {"no-forecast": not forecast, "strength": strength, "strict": strict}
         return self._with_files(Prediction, "predict", options, flags, out, progress)
 
     def measure(
@@ -151,12 +153,22 @@ class Scene:
         out: Path | None = None,
         element: float | None = None,
         tolerance: float | None = None,
+        to_failure: bool | str = False,
+        fine: tuple[float, float] | None = None,
+        fine_element: float | None = None,
         progress: Progress | None = None,
     ) -> Analysis:
         """Stress, creep and damage of members (all if none is named) over their load history. Models of finite elements
-        are written into ``out``, or where that is not given into a folder that goes when the analysis does."""
+        are written into ``out``, or where that is not given into a folder that goes when the analysis does.
+
+        ``to_failure``: after that, loads are raised until members fail (:class:`Strength`): all that can be, or the one
+        that is named. ``fine``: of one member, only what lies between two shares of its axis, in bricks of half the size
+        or of ``fine_element`` m, driven at its cuts by the life of all of it. One of the two.
+        """
         options = {"member": _list(member), "element": element, "tolerance": tolerance}
-        return self._with_files(Analysis, "analyze", options, {}, out, progress)
+        options |= {"to-failure": to_failure if isinstance(to_failure, str) else None}
+        options |= {"fine": None if fine is None else f"{fine[0]}..{fine[1]}", "fine-element": fine_element}
+        return self._with_files(Analysis, "analyze", options, {"to-failure": to_failure is True}, out, progress)
 
     def _with_files(self, kind, command, options, flags, out, progress):
         folder = None if out is not None else tempfile.mkdtemp(prefix="intrados-")
