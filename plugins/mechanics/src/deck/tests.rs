@@ -198,3 +198,72 @@ fn bars_in_concrete_yield() {
     assert!((1.0 / (1.0 / bar.hardening - 1.0 / bar.modulus) / 1e9 - 1.0).abs() < 1e-9);
     assert_eq!(steel::bar(200e9, &[]), crate::material::steel::Bar::elastic(200e9));
 }
+
+/// Nodes of a grid of bricks of C3D8I at places from the unit cube, bricks, E = 200 GPa.
+fn grid(size: [usize; 3], place: impl Fn([f64; 3]) -> [f64; 3]) -> (String, Vec<[f64; 3]>) {
+    let [nx, ny, nz] = size;
+    let number = |i: usize, j: usize, k: usize| 1 + i + (nx + 1) * (j + (ny + 1) * k);
+    let (mut nodes, mut elements) = (String::from("*NODE\n"), String::new());
+    let mut places = Vec::new();
+    for (k, j, i) in all([nx + 1, ny + 1, nz + 1]) {
+        let at = place([i as f64 / nx as f64, j as f64 / ny as f64, k as f64 / nz as f64]);
+        nodes += &format!("{},{:?},{:?},{:?}\n", number(i, j, k), at[0], at[1], at[2]);
+        places.push(at);
+    }
+    for (e, (k, j, i)) in all(size).enumerate() {
+        let face = |k| {
+            [number(i, j, k), number(i + 1, j, k), number(i + 1, j + 1, k), number(i, j + 1, k)]
+        };
+        let corners = [face(k), face(k + 1)].concat();
+        let corners: Vec<String> = corners.iter().map(usize::to_string).collect();
+        elements += &format!("{},{}\n", e + 1, corners.join(","));
+    }
+    let law = "*MATERIAL,NAME=S\n*ELASTIC\n200e9,.3\n*SOLID SECTION,ELSET=ALL,MATERIAL=S\n";
+    (format!("{nodes}*ELEMENT,TYPE=C3D8I,ELSET=ALL\n{elements}{law}"), places)
+}
+
+/// (k, j, i), i fastest.
+fn all([nx, ny, nz]: [usize; 3]) -> impl Iterator<Item = (usize, usize, usize)> {
+    (0..nz).flat_map(move |k| (0..ny).flat_map(move |j| (0..nx).map(move |i| (k, j, i))))
+}
+
+/// Rows that name the nodes which satisfy a test.
+fn rows(places: &[[f64; 3]], what: &str, test: impl Fn(&[f64; 3]) -> bool) -> String {
+    let chosen = (1..).zip(places).filter(|(_, at)| test(*at));
+    chosen.map(|(n, _)| format!("{n},{what}\n")).collect()
+}
+
+fn solved(text: &str) -> Vec<f64> {
+    let case = case(text).unwrap();
+    case.run(MarchSettings::of_deck(), &Job::default(), |_, _, _| Ok(())).unwrap().x
+}
+
+/// A needle of bricks 100:1, 20 m long, bends as a beam: P L³/3EI.
+#[test]
+fn needles_bend_as_beams() {
+    let (text, places) = grid([20, 12, 12], |[x, y, z]| [20.0 * x, 0.12 * y, 0.12 * z]);
+    let held = rows(&places, "1,3", |at| at[0] == 0.0);
+    let pushed = rows(&places, "3,1", |at| at[0] == 20.0);
+    let x = solved(&format!("{text}*BOUNDARY\n{held}*STEP\n*STATIC\n*CLOAD\n{pushed}*END STEP\n"));
+    let expected = 169.0 * 20f64.powi(3) / (3.0 * 200e9 * 0.12f64.powi(4) / 12.0);
+    assert!((x[x.len() - 1] / expected - 1.0).abs() < 5e-3, "{} {expected}", x[x.len() - 1]);
+}
+
+/// A quarter of a pipe of R/t = 2000 widens under inner pressure by p R²/E t.
+#[test]
+fn thin_pipes_widen_as_rings() {
+    let (radius, thick) = (2.0, 0.001);
+    let (text, places) = grid([60, 40, 1], |[t, z, r]| {
+        let (sin, cos) = (t * std::f64::consts::FRAC_PI_2).sin_cos();
+        let r = radius + thick * (r - 0.5);
+        // The ends of the quarter lie in its planes to the bit.
+        [if t == 1.0 { 0.0 } else { r * cos }, r * sin, z]
+    });
+    let held = [0, 1, 2].map(|c| rows(&places, &(c + 1).to_string(), |at| at[c] == 0.0)).concat();
+    let text = format!("{text}*BOUNDARY\n{held}*STEP\n*STATIC\n*DLOAD\nALL,P1,1e3\n*END STEP\n");
+    let expected = 1e3 * radius * radius / (200e9 * thick);
+    for (at, u) in places.iter().zip(solved(&text).as_chunks::<3>().0) {
+        let wide = (at[0] * u[0] + at[1] * u[1]) / at[0].hypot(at[1]);
+        assert!((wide / expected - 1.0).abs() < 0.01, "{at:?}: {wide} {expected}");
+    }
+}

@@ -71,7 +71,8 @@ impl MarchSettings {
     /// balance: 5e-4 of the displacements). Bricks of 1:1000 leave more than that to rounding.
     #[must_use]
     pub fn of_deck() -> Self {
-        Self { tolerance: 1e-8, floor: 1e-5, linear: 1e-6, ..Self::default() }
+        let method = Method::Once;
+        Self { tolerance: 1e-8, floor: 1e-5, linear: 1e-6, method, ..Self::default() }
     }
 }
 

@@ -59,7 +59,8 @@ impl System<'_> {
             constraints.fix(node as usize, usize::from(component), 0.0)?;
         }
         let quiet = job.part(0.0, 0.0);
-        let Ok(mut solver) = Solver::new(&matrix, &constraints, Method::Auto, &quiet) else {
+        // Five to two dozen solutions of one matrix: what a factor costs pays sooner than for one.
+        let Ok(mut solver) = Solver::new(&matrix, &constraints, Method::Once, &quiet) else {
             return Ok(None);
         };
         let geometric = self.geometric(history, points);

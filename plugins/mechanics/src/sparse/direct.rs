@@ -64,12 +64,25 @@ impl Factor {
         definite: bool,
         job: &Job,
     ) -> Result<Self, SolveError> {
+        Self::in_order(matrix, mask, definite, &nested_dissection(matrix.pattern()), job)
+    }
+
+    /// The same in an order of nodes that is known.
+    ///
+    /// # Errors
+    /// As [`Factor::new`].
+    pub(super) fn in_order<const B: usize>(
+        matrix: &BlockMatrix<B>,
+        mask: &Mask<B>,
+        definite: bool,
+        order: &[u32],
+        job: &Job,
+    ) -> Result<Self, SolveError> {
         let unknowns = matrix.unknowns();
         let large = |why: String| SolveError::TooLarge { unknowns, why };
         let upper =
             Upper::new(matrix, mask).ok_or_else(|| large("more than 2³² entries".into()))?;
         job.step(1, 10)?;
-        let order = nested_dissection(matrix.pattern());
         let mut forward = Vec::with_capacity(unknowns);
         order.iter().for_each(|&n| forward.extend((0..B as u32).map(|c| n * B as u32 + c)));
         let mut inverse = vec![0; unknowns];

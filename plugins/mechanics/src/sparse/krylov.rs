@@ -62,12 +62,34 @@ pub(super) fn scale<const B: usize>(d: &[Block<B, B>], r: &[f64], z: &mut [f64])
     });
 }
 
+/// When conjugate gradients end.
+pub(super) struct Until<'a> {
+    /// ‖r‖ that is enough.
+    pub(super) goal: f64,
+    /// Iterations at most.
+    pub(super) limit: usize,
+    /// How many iterations something else costs that would do as well: where more than these are
+    /// left, they end.
+    pub(super) instead: Option<&'a dyn Fn() -> f64>,
+}
+
+/// Iterations after which it is asked for the first time what is left, then after twice as many.
+const TRIAL: usize = 12;
+
+/// Iterations that are left if they go on as so many have from the residual at the start to now.
+fn left(iterations: usize, [start, now, goal]: [f64; 3]) -> f64 {
+    let rate = (start / now).ln() / iterations as f64;
+    if rate > 0.0 { (now / goal).ln() / rate } else { f64::INFINITY }
+}
+
 /// How the iterations went.
 #[derive(Debug, Default)]
 pub(super) struct History {
     pub(super) iterations: usize,
     /// ‖r‖ / ‖b‖ of the recurrence at the end.
     pub(super) residual: f64,
+    /// Whether they ended because something else costs less.
+    pub(super) slow: bool,
     /// Step lengths α and ratios β: the Lanczos matrix of the preconditioned operator.
     pub(super) coefficients: Vec<(f64, f64)>,
 }
@@ -100,7 +122,7 @@ pub(super) fn conjugate_gradients<const B: usize>(
     precondition: &dyn Precondition<B>,
     x: &mut [f64],
     r: &mut [f64],
-    (goal, limit): (f64, usize),
+    Until { goal, limit, instead }: Until<'_>,
     job: &Job,
 ) -> Result<History, SolveError> {
     let mut history = History::default();
@@ -131,6 +153,15 @@ pub(super) fn conjugate_gradients<const B: usize>(
         history.coefficients.push((alpha, 0.0));
         history.iterations += 1;
         before = rz;
+        let trials = history.iterations / TRIAL;
+        if history.iterations.is_multiple_of(TRIAL)
+            && trials.is_power_of_two()
+            && let Some(cost) = instead
+            && left(history.iterations, [start, history.residual, goal]) > cost()
+        {
+            history.slow = true;
+            break;
+        }
         let (done, total) = ((start / history.residual.max(goal)).ln(), (start / goal).ln());
         job.step((1e4 * done.max(0.0)) as usize, (1e4 * total) as usize)?;
     }

@@ -6,6 +6,7 @@
 //! |---|---|---|
 //! | [`Method::Direct`] | Cholesky by `faer` on a nested-dissection ordering of our own; LBLᵀ where the matrix is indefinite | small systems, many right-hand sides, snap-back |
 //! | [`Method::Multigrid`] | conjugate gradients with smoothed aggregation on the rigid-body modes | large systems: iterations do not grow with the mesh |
+//! | [`Method::Once`] | the one of both that costs less | decks |
 //! | [`Method::Jacobi`] | conjugate gradients with the inverse blocks of the diagonal | a check of the others |
 //!
 //! ```

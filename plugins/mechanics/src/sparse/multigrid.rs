@@ -15,7 +15,7 @@ use super::{
     clusters::Clusters,
     constraint::Mask,
     direct::Factor,
-    krylov::{Operator, Precondition, conjugate_gradients},
+    krylov::{Operator, Precondition, Until, conjugate_gradients},
     prolong::{Prolongation, Tentative, entry, row_of, rows_in_chunks},
 };
 
@@ -177,7 +177,8 @@ fn largest_eigenvalue<const B: usize>(
         .collect();
     operator.mask.project(&mut r);
     let mut x = vec![0.0; r.len()];
-    let history = conjugate_gradients(operator, inverse, &mut x, &mut r, (0.0, LANCZOS.0), job)?;
+    let until = Until { goal: 0.0, limit: LANCZOS.0, instead: None };
+    let history = conjugate_gradients(operator, inverse, &mut x, &mut r, until, job)?;
     let largest = LANCZOS.1 * history.largest_eigenvalue();
     Ok(if largest > 0.0 { largest } else { 1.0 })
 }

@@ -8,6 +8,29 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::{Pattern, Place};
 
+/// How much work a factor in this order is: Σ c² over its columns, c being their entries, all in
+/// nodes. By the tree of elimination, up which each row goes from each of its entries (Davis 2005).
+pub(super) fn work(pattern: &Pattern, order: &[u32]) -> f64 {
+    let mut place = vec![0; order.len()];
+    (0_u32..).zip(order).for_each(|(k, &node)| place[node as usize] = k);
+    let mut parent = vec![u32::MAX; order.len()];
+    let (mut seen, mut entries) = (parent.clone(), vec![1_u32; order.len()]);
+    for (k, &node) in (0_u32..).zip(order) {
+        seen[k as usize] = k;
+        for &other in pattern.row(node as usize) {
+            let mut at = place[other as usize];
+            while at < k && seen[at as usize] != k {
+                let up = &mut parent[at as usize];
+                *up = k.min(*up);
+                seen[at as usize] = k;
+                entries[at as usize] += 1;
+                at = *up;
+            }
+        }
+    }
+    entries.iter().map(|&c| f64::from(c) * f64::from(c)).sum()
+}
+
 /// Parts of this many nodes are not cut further.
 const LEAF: usize = 24;
 
@@ -15,6 +38,7 @@ const LEAF: usize = 24;
 pub(super) fn nested_dissection(pattern: &Pattern) -> Vec<u32> {
     let mut order: Vec<u32> = (0..pattern.nodes() as u32).collect();
     let mut side = vec![0_u32; pattern.nodes()];
+    let units = layers(pattern);
     // Parts still to be cut, each a range of `order`: a stack rather than recursion, since a
     // degenerate mesh may cut badly.
     let mut parts = vec![(0, order.len())];
@@ -24,7 +48,7 @@ pub(super) fn nested_dissection(pattern: &Pattern) -> Vec<u32> {
             continue;
         }
         tag += 2;
-        let (left, right) = cut(&mut order[start..end], pattern, &mut side, tag);
+        let (left, right) = cut(&mut order[start..end], pattern, &units, &mut side, tag);
         // A side that is all border leaves nothing to gain.
         if left > 0 && right > 0 {
             parts.push((start, start + left));
@@ -35,8 +59,14 @@ pub(super) fn nested_dissection(pattern: &Pattern) -> Vec<u32> {
 }
 
 /// Sorts `nodes` into left, right and separator; returns how many are left and right.
-fn cut(nodes: &mut [u32], pattern: &Pattern, side: &mut [u32], tag: u32) -> (usize, usize) {
-    let cuts = directions(nodes, &pattern.places).map(|axis| {
+fn cut(
+    nodes: &mut [u32],
+    pattern: &Pattern,
+    units: &[f64; 3],
+    side: &mut [u32],
+    tag: u32,
+) -> (usize, usize) {
+    let cuts = directions(nodes, &pattern.places, units).map(|axis| {
         let mut sorted = nodes.to_vec();
         let half = halves(&mut sorted, &pattern.places, axis);
         separate(&sorted, half, pattern, side, tag)
@@ -78,9 +108,23 @@ fn separate(
     [a, b, separator]
 }
 
-/// Across what to cut: the longest axis of the box (which meets the planes of grids), and the
-/// longest axis of inertia (which meets the radial planes of rings).
-fn directions(nodes: &[u32], places: &[Place]) -> [[f64; 3]; 2] {
+/// How far apart nodes that share an element are in the mean, along each axis, m.
+fn layers(pattern: &Pattern) -> [f64; 3] {
+    let place = |node: usize| pattern.places[node].position;
+    let mut sums = [0.0; 3];
+    for node in 0..pattern.nodes() {
+        for &other in pattern.row(node) {
+            let (a, b) = (place(node), place(other as usize));
+            (0..3).for_each(|c| sums[c] += (a[c] - b[c]).abs());
+        }
+    }
+    sums.map(|sum| if sum > 0.0 { sum / pattern.blocks() as f64 } else { 1.0 })
+}
+
+/// Across what to cut: the axis of the box that has the most layers (which meets the planes of
+/// grids, however long their bricks are), and the longest axis of inertia (which meets the radial
+/// planes of rings).
+fn directions(nodes: &[u32], places: &[Place], units: &[f64; 3]) -> [[f64; 3]; 2] {
     let (mut low, mut high, mut mean) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3], [0.0; 3]);
     for &n in nodes {
         for (c, x) in places[n as usize].position.iter().enumerate() {
@@ -89,8 +133,8 @@ fn directions(nodes: &[u32], places: &[Place]) -> [[f64; 3]; 2] {
             mean[c] += x / nodes.len() as f64;
         }
     }
-    let axis =
-        (0..3).fold(0, |best, c| if high[c] - low[c] > high[best] - low[best] { c } else { best });
+    let count = |c: usize| (high[c] - low[c]) / units[c];
+    let axis = (0..3).fold(0, |best, c| if count(c) > count(best) { c } else { best });
     let mut inertia = Matrix3::zeros();
     for &n in nodes {
         let x = Vector3::from(places[n as usize].position) - Vector3::from(mean);

@@ -8,8 +8,9 @@ use super::{
     body,
     constraint::Mask,
     direct::Factor,
-    krylov::{Jacobi, Operator, Precondition, conjugate_gradients},
+    krylov::{Jacobi, Operator, Precondition, Until, conjugate_gradients},
     multigrid::Multigrid,
+    order::{nested_dissection, work},
     vector::{axpy, largest, norm, not_finite},
 };
 
@@ -22,6 +23,11 @@ const LIMIT: (usize, usize) = (1_000, 20_000);
 const PATIENCE: usize = 200;
 /// Unknowns up to which a factorisation is tried where multigrid gave up.
 const FACTORABLE: usize = 150_000;
+/// Iterations of multigrid that a hierarchy and the fewest of them cost.
+const HIERARCHY: f64 = 12.0;
+/// What a factorisation multiplies while multigrid goes through an iteration, for every unknown:
+/// 5e9 a second, and 1.5e-6 s.
+const MULTIPLIED: f64 = 7_500.0;
 
 /// How to solve.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -30,12 +36,28 @@ pub enum Method {
     /// indefinite matrix), if the factor can fit.
     #[default]
     Auto,
+    /// The same for few systems that are solved closely: direct also where that costs less than a
+    /// hierarchy (thin sheets), or than the iterations that multigrid has left at its rate (needles).
+    Once,
     /// A factorisation.
     Direct,
     /// Conjugate gradients with smoothed-aggregation multigrid.
     Multigrid,
     /// Conjugate gradients with the inverse blocks of the diagonal.
     Jacobi,
+}
+
+impl Method {
+    /// Whether what solves may change.
+    fn may_change(self) -> bool {
+        matches!(self, Self::Auto | Self::Once)
+    }
+}
+
+/// Iterations of multigrid that a factorisation in an order costs.
+fn factor_cost<const B: usize>(matrix: &BlockMatrix<B>, order: &[u32]) -> f64 {
+    let nodes = matrix.nodes().max(1) as f64;
+    (B * B) as f64 * work(matrix.pattern(), order) / (MULTIPLIED * nodes)
 }
 
 /// A solution, and what it took.
@@ -81,6 +103,8 @@ pub struct Solver<const B: usize> {
     at_first: Option<usize>,
     /// Whether it has become too old.
     stale: bool,
+    /// Whether multigrid has ended because a factorisation costs less.
+    slow: bool,
     /// Whether multigrid has given up; from then on everything is factorised.
     fell_back: bool,
 }
@@ -103,9 +127,18 @@ impl<const B: usize> Engine<B> {
         job: &Job,
     ) -> Result<Self, SolveError> {
         match method {
-            Method::Auto if matrix.unknowns() <= SMALL => {
+            Method::Auto | Method::Once if matrix.unknowns() <= SMALL => {
                 Self::new(matrix, mask, Method::Direct, job)
             }
+            Method::Once if matrix.unknowns() <= FACTORABLE => {
+                let order = nested_dissection(matrix.pattern());
+                if factor_cost(matrix, &order) < HIERARCHY {
+                    Ok(Self::Factor(Factor::in_order(matrix, mask, false, &order, job)?))
+                } else {
+                    Self::new(matrix, mask, Method::Auto, job)
+                }
+            }
+            Method::Once => Self::new(matrix, mask, Method::Auto, job),
             Method::Auto => match Self::new(matrix, mask, Method::Multigrid, job) {
                 Err(SolveError::Indefinite { .. }) => Self::new(matrix, mask, Method::Direct, job),
                 other => other,
@@ -135,22 +168,23 @@ impl<const B: usize> Engine<B> {
         }
     }
 
-    /// Improves x from the residual r; returns the iterations.
+    /// Improves x from the residual r; returns the iterations, and whether something else would cost
+    /// less than those that are left.
     fn improve(
         &self,
         operator: Operator<B>,
         x: &mut [f64],
         r: &mut [f64],
-        until: (f64, usize),
+        until: Until<'_>,
         job: &Job,
-    ) -> Result<usize, SolveError> {
+    ) -> Result<(usize, bool), SolveError> {
         let jacobi;
         let precondition: &dyn Precondition<B> = match self {
             Self::Factor(factor) => {
                 factor.solve_in_place(r)?;
                 operator.mask.project(r);
                 axpy(1.0, r, x);
-                return Ok(1);
+                return Ok((1, false));
             }
             Self::Jacobi(inverse) => {
                 jacobi = Jacobi { inverse };
@@ -159,7 +193,8 @@ impl<const B: usize> Engine<B> {
             Self::Elastic(grid) => grid,
             Self::Scalar(grid) => grid,
         };
-        Ok(conjugate_gradients(operator, precondition, x, r, until, job)?.iterations)
+        let history = conjugate_gradients(operator, precondition, x, r, until, job)?;
+        Ok((history.iterations, history.slow))
     }
 }
 
@@ -180,7 +215,8 @@ impl<const B: usize> Solver<B> {
             let mask = checked(matrix, constraints)?;
             job.step(0, 1)?;
             let engine = Engine::new(matrix, &mask, method, job)?;
-            Ok(Self { mask, method, engine, at_first: None, stale: false, fell_back: false })
+            let (stale, slow, fell_back) = (false, false, false);
+            Ok(Self { mask, method, engine, at_first: None, stale, slow, fell_back })
         })
     }
 
@@ -218,7 +254,7 @@ impl<const B: usize> Solver<B> {
             };
             self.mask = mask;
             match refreshed {
-                Err(SolveError::Indefinite { .. }) if self.method == Method::Auto => {
+                Err(SolveError::Indefinite { .. }) if self.method.may_change() => {
                     self.engine = Engine::new(matrix, &self.mask, Method::Direct, job)?;
                     Ok(())
                 }
@@ -251,7 +287,7 @@ impl<const B: usize> Solver<B> {
         if let Some(node) = self.mask.loaded_void(rhs) {
             return Err(SolveError::NoStiffness { node });
         }
-        let factorable = self.method == Method::Auto
+        let factorable = self.method.may_change()
             && !matches!(self.engine, Engine::Factor(_))
             && expected <= FACTORABLE;
         inside(|| match self.iterate(matrix, rhs, constraints, tolerance, job) {
@@ -259,10 +295,14 @@ impl<const B: usize> Solver<B> {
                 if factorable =>
             {
                 if let SolveError::NotConverged { iterations, .. } = why {
-                    tracing::warn!(
-                        "multigrid has not converged in {iterations} iterations: the system of {expected} unknowns is factorised"
-                    );
-                    (self.method, self.fell_back) = (Method::Direct, true);
+                    if self.slow {
+                        tracing::debug!("slow after {iterations} iterations of multigrid");
+                    } else {
+                        tracing::warn!(
+                            "multigrid has not converged in {iterations} iterations: the system of {expected} unknowns is factorised"
+                        );
+                    }
+                    (self.method, self.fell_back) = (Method::Direct, !self.slow);
                 }
                 self.engine = Engine::new(matrix, &self.mask, Method::Direct, job)?;
                 self.iterate(matrix, rhs, constraints, tolerance, job)
@@ -275,7 +315,7 @@ impl<const B: usize> Solver<B> {
     fn limit(&self, unknowns: usize) -> usize {
         match self.engine {
             Engine::Jacobi(_) => LIMIT.1,
-            _ if self.method == Method::Auto && unknowns <= FACTORABLE => PATIENCE,
+            _ if self.method.may_change() && unknowns <= FACTORABLE => PATIENCE,
             _ => LIMIT.0,
         }
     }
@@ -294,22 +334,25 @@ impl<const B: usize> Solver<B> {
         let scale = norm(&r);
         let goal = tolerance * scale;
         let (mut iterations, mut reached, limit) = (0, scale, self.limit(rhs.len()));
+        let cost = || factor_cost(matrix, &nested_dissection(matrix.pattern()));
+        let is_worth_asking = self.method == Method::Once && rhs.len() <= FACTORABLE;
         // What rounding makes of the recurrence is repaired from the true residual, as long as that
         // gains anything.
         while reached > goal && iterations < limit {
-            iterations += self.engine.improve(
-                operator,
-                &mut x,
-                &mut r,
-                (0.7 * goal, limit - iterations),
-                job,
-            )?;
+            let until = Until {
+                goal: 0.7 * goal,
+                limit: limit - iterations,
+                instead: if is_worth_asking { Some(&cost) } else { None },
+            };
+            let (more, is_slow) = self.engine.improve(operator, &mut x, &mut r, until, job)?;
+            iterations += more;
+            self.slow = is_slow;
             r = residual(operator, rhs, &x);
             let before = std::mem::replace(&mut reached, norm(&r));
             if let Some(i) = not_finite(&x) {
                 return Err(SolveError::Singular { node: i / B });
             }
-            if reached.is_nan() || reached > 0.5 * before {
+            if is_slow || reached.is_nan() || reached > 0.5 * before {
                 break;
             }
             job.step(1, 2)?;

@@ -8,7 +8,7 @@ use super::{
     brick::{Bricks, lining, pushed_cube},
     constraint::Mask,
     direct::Factor,
-    order::nested_dissection,
+    order::{nested_dissection, work},
     *,
 };
 
@@ -461,6 +461,55 @@ fn nested_dissection_is_an_order_that_keeps_the_factor_small() {
     let factor =
         Factor::new(&matrix, &Mask::new(&constraints, &matrix), true, &Job::default()).unwrap();
     assert!(3 * factor.entries() < 2 * band, "{} {band}", factor.entries());
+}
+
+/// Bricks that are a hundred times as long as wide are cut as cubes are, and what the order says of
+/// the work is what the factor has.
+#[test]
+fn needles_are_ordered_by_their_layers() {
+    let grid = |length: f64| Bricks::new([12, 12, 12], |[x, y, z]| [length * x, y, z]).pattern().0;
+    let [cube, needle] = [1.0, 100.0].map(|length| {
+        let pattern = grid(length);
+        work(&pattern, &nested_dissection(&pattern))
+    });
+    assert!(needle < 1.05 * cube, "{needle} {cube}");
+    // A row of n nodes: two entries in each column but the last.
+    let row = Bricks::new([1, 1, 50], |x| x).pattern().0;
+    let natural: Vec<u32> = (0..row.nodes() as u32).collect();
+    // Layers of four nodes, each joined to the next: 8, 7, 6, 5 entries, and 4, 3, 2, 1 at the end.
+    let expected = 50.0 * (64.0 + 49.0 + 36.0 + 25.0) + 30.0;
+    assert!((work(&row, &natural) - expected).abs() < 1e-9, "{}", work(&row, &natural));
+}
+
+/// A needle of bricks 100:1 and a sheet are factorised where multigrid would cost more, a cube is
+/// not; all of them are solved.
+#[test]
+fn what_costs_less_solves() {
+    let solved = |size: [usize; 3], by: [f64; 3]| {
+        let bricks = Bricks::new(size, |x| std::array::from_fn(|c| by[c] * x[c]));
+        let matrix = bricks.stiffness(|_| 3e10);
+        let mut constraints = Constraints::new(matrix.nodes());
+        let mut rhs = vec![0.0; matrix.unknowns()];
+        for (node, point) in bricks.points.iter().enumerate() {
+            if point[0] == 0.0 {
+                constraints.fix_all(node, [0.0; 3]).unwrap();
+            } else if point[0] == by[0] {
+                rhs[3 * node + 2] = 1.0;
+            }
+        }
+        let [once, direct] = [Method::Once, Method::Direct].map(|method| {
+            solve(&matrix, &rhs, &constraints, method, 1e-6, &Job::default()).unwrap()
+        });
+        (once.method, difference(&once.x, &direct.x))
+    };
+    for (size, by, method) in [
+        ([14, 14, 14], [1.0; 3], "multigrid"),
+        ([14, 14, 14], [14.0, 0.14, 0.14], "direct"),
+        ([60, 60, 1], [1.0, 1.0, 5e-4], "direct"),
+    ] {
+        let (found, off) = solved(size, by);
+        assert!(found == method && off < 1e-4, "{by:?}: {found} {off:e}");
+    }
 }
 
 #[test]
