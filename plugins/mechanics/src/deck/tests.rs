@@ -229,7 +229,7 @@ fn all([nx, ny, nz]: [usize; 3]) -> impl Iterator<Item = (usize, usize, usize)> 
 
 /// Rows that name the nodes which satisfy a test.
 fn rows(places: &[[f64; 3]], what: &str, test: impl Fn(&[f64; 3]) -> bool) -> String {
-    let chosen = (1..).zip(places).filter(|(_, at)| test(*at));
+    let chosen = (1..).zip(places).filter(|(_, at)| test(at));
     chosen.map(|(n, _)| format!("{n},{what}\n")).collect()
 }
 

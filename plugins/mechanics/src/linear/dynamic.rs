@@ -26,7 +26,7 @@ const MANY: usize = 1_000_000;
 /// ‖f − M a‖ / ‖f‖ of accelerations at the beginning.
 const TOLERANCE: f64 = 1e-7;
 /// Part of the first increment in which what begins suddenly sets in: motions that are faster do not
-/// take it up.
+/// take it up. Where that increment is cut, it sets in sooner.
 const SUDDEN: f64 = 0.1;
 
 /// The end of a step of motion.
@@ -54,7 +54,12 @@ pub(super) fn solve(
         };
         match found {
             Some(found) => (state, long) = found,
-            None if !fixed && length > 1e-9 * duration => long = 0.2 * length,
+            None if !fixed && length > 1e-9 * duration => {
+                long = 0.2 * length;
+                if state.time == 0.0 {
+                    state = course.begun(SUDDEN * long, job)?;
+                }
+            }
             None => count = MANY,
         }
         if count >= MANY {

@@ -298,8 +298,8 @@ fn every_flaw_is_named_with_its_line() {
         ("TYPE=C3D8,", "TYP=C3D8,", "a.inp:14: *ELEMENT: parameter \"TYP\" is not supported"),
         (
             "*MATERIAL",
-            "*PLASTIC\n1,2\n*MATERIAL",
-            "a.inp:17: *PLASTIC is not supported; supported are *NODE",
+            "*CREEP\n1,2\n*MATERIAL",
+            "a.inp:17: *CREEP is not supported; supported are *NODE",
         ),
         (
             "*MATERIAL",
