@@ -123,7 +123,12 @@ fn found(text: &str, other: fn(&str) -> String) -> String {
     }
     let pattern = patterns().iter().find_map(|pattern| Some((pattern, values(pattern, text)?)));
     let Some((pattern, values)) = pattern else { return other(text) };
-    let values: Vec<String> = values.into_iter().map(|value| found(value, other)).collect();
+    // What stands in quotes is a name, or what somebody has typed.
+    let is_quoted = pattern.split("{}").map(|before| before.ends_with('“'));
+    let value = |(value, is_quoted): (&str, bool)| {
+        if is_quoted { value.to_owned() } else { found(value, other) }
+    };
+    let values: Vec<String> = values.into_iter().zip(is_quoted).map(value).collect();
     let values: Vec<&dyn Display> = values.iter().map(|v| v as &dyn Display).collect();
     filled(translated(pattern), &values)
 }

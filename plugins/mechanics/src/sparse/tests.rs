@@ -498,7 +498,7 @@ fn what_costs_less_solves() {
             }
         }
         let [once, direct] = [Method::Once, Method::Direct].map(|method| {
-            solve(&matrix, &rhs, &constraints, method, 1e-6, &Job::default()).unwrap()
+            solve(&matrix, &rhs, &constraints, method, 1e-5, &Job::default()).unwrap()
         });
         (once.method, difference(&once.x, &direct.x))
     };
@@ -508,7 +508,7 @@ fn what_costs_less_solves() {
         ([60, 60, 1], [1.0, 1.0, 5e-4], "direct"),
     ] {
         let (found, off) = solved(size, by);
-        assert!(found == method && off < 1e-4, "{by:?}: {found} {off:e}");
+        assert!(found == method && off < 1e-3, "{by:?}: {found} {off:e}");
     }
 }
 
