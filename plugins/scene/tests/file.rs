@@ -76,7 +76,7 @@ fn faults_are_named_with_their_place_and_remedy() {
         ("    camera: [],\n".into(), "s.ron:3:5", "did you mean `cameras`"),
         ("    materials: [(name: \"a\", color: (1, 1, 1))],\n".into(), "s.ron:3:29", "did you mean `colour`"),
         ("    shapes: [Quad(corner: (0, 0, 0), u: (1, 0, 0), w: (0, 1, 0))],\n".into(), "s.ron:3:52", "unexpected field named `w`"),
-        ("    shapes: [Sphere(radius: 1)],\n".into(), "s.ron:3:14", "either `Quad` or `Box` instead; "),
+        ("    shapes: [Sphere(radius: 1)],\n".into(), "s.ron:3:14", "or `Mesh` instead; `intrados schema"),
         ("    shapes: [Sphere(radius: 1)],\n".into(), "s.ron:3:14", "shows each of them"),
         ("    shapes: [Quad(corner: (0, 0, 0), u: (1, 0, 0))],\n".into(), "s.ron:3:", "add `v: …`"),
         ("    title: \"a\",\n    title: \"b\",\n".into(), "s.ron:4:5", "keep one"),
