@@ -1,5 +1,7 @@
 //! One entry for all methods.
 
+use std::cell::OnceCell;
+
 use intrados_stage::Job;
 
 use super::{
@@ -334,7 +336,10 @@ impl<const B: usize> Solver<B> {
         let scale = norm(&r);
         let goal = tolerance * scale;
         let (mut iterations, mut reached, limit) = (0, scale, self.limit(rhs.len()));
-        let cost = || factor_cost(matrix, &nested_dissection(matrix.pattern()));
+        // Asked for several times, of one matrix.
+        let known = OnceCell::new();
+        let find = || factor_cost(matrix, &nested_dissection(matrix.pattern()));
+        let cost = || *known.get_or_init(find);
         let is_worth_asking = self.method == Method::Once && rhs.len() <= FACTORABLE;
         // What rounding makes of the recurrence is repaired from the true residual, as long as that
         // gains anything.

@@ -269,15 +269,21 @@ mod tests {
         assert_eq!(load(&path).structure.concretes[0].fcm_mpa, None);
     }
 
-    #[test]
-    fn ends_and_laps_of_bars_are_written_as_places_along_the_member() {
-        let (_folder, path) = written();
+    /// The scene, its first column with bars around.
+    fn with_bars() -> (tempfile::TempDir, PathBuf) {
+        let (folder, path) = written();
         let bars = [
             ("Bars", "cover", "35"),
             ("Bars", "bars around the section", "8"),
             ("Bars", "their diameter", "16"),
         ];
         amend(&path, &load(&path), Some("C1"), &bars).unwrap();
+        (folder, path)
+    }
+
+    #[test]
+    fn ends_and_laps_of_bars_are_written_as_places_along_the_member() {
+        let (_folder, path) = with_bars();
         let said = |path: &std::path::Path| {
             let text = fs::read_to_string(path).unwrap();
             let (_, bars) = text.split_once("Around(").unwrap();
@@ -326,13 +332,7 @@ mod tests {
 
     #[test]
     fn places_are_shares_of_the_axis_as_it_becomes() {
-        let (_folder, path) = written();
-        let bars = [
-            ("Bars", "cover", "35"),
-            ("Bars", "bars around the section", "8"),
-            ("Bars", "their diameter", "16"),
-        ];
-        amend(&path, &load(&path), Some("C1"), &bars).unwrap();
+        let (_folder, path) = with_bars();
         let scene = load(&path);
         let all = fields(&scene, scene.members.first());
         let values = [
