@@ -50,6 +50,9 @@ pub struct Setting {
     pub transverse: bool,
     /// Whether bars give tension back to the concrete between its cracks ([`Ties::held`]).
     pub bonded: bool,
+    /// Whether faces of a crack that slide press each other, since they ride up (`cracks::Faces`):
+    /// by their sources, but members come no nearer to what was measured, at several times the work.
+    pub dilation: bool,
     /// Creep and shrinkage, or none.
     pub creep: Option<Creep>,
     /// Creep by this chain, whatever `creep` says.
@@ -83,6 +86,7 @@ impl Setting {
             cracks: Cracks::Diffuse,
             transverse: true,
             bonded: true,
+            dilation: false,
             creep: None,
             chain: None,
             ageing: false,

@@ -215,6 +215,7 @@ fn jacked(text: &str, element: Option<f64>, watch: &mut impl Observer) -> Outcom
         if let Matter::Concrete(mix) = &mut body.matter {
             mix.1.transverse = std::env::var_os("EXPERIMENT_UNSOFTENED").is_none();
             mix.1.bonded = std::env::var_os("EXPERIMENT_UNBONDED").is_none();
+            mix.1.dilation = std::env::var_os("EXPERIMENT_DILATION").is_some();
         }
     }
     analyze(&prepared, MarchSettings::of_life(), &Job::default(), watch).unwrap().0
