@@ -114,7 +114,7 @@ fn tendons_tell_where_their_stress_went() {
 /// The usual meshes of the bundled members are fine enough for their concrete, along every edge.
 #[test]
 fn usual_meshes_are_fine_enough() {
-    for name in ["column", "beam", "tunnel"] {
+    for name in ["column", "beam", "tunnel", "tunnel-pipe"] {
         let scene = Scene::load_bundled(name, &Job::default()).unwrap();
         for member in &scene.structure.assemblies {
             let prepared = prepare(&scene, member, Meshing::default(), &Job::default()).unwrap();

@@ -33,6 +33,7 @@ pub fn bundled() -> &'static [(&'static str, &'static str)] {
         "column",
         "beam",
         "tunnel",
+        "tunnel-pipe",
         "specimens",
         "cornell",
         "room",
