@@ -142,7 +142,7 @@ fn bars_run_on_through_the_plane_and_do_not_slip_there() {
 fn stressed(length: f64, held: &str, both_ends: bool) -> Result<Prepared, MemberError> {
     let text = format!(
         "members: [(id: \"B\", at: (0, 0, 0), concrete: \"C30/37\", body: Beam(section: Rectangle(width_m: 0.3, depth_m: 0.6), length_m: {length},
-            tendons: [(name: \"T\", duct_mm: 45, line: [(0, -0.1, 0), (0.5, -0.1, 0), (1, -0.1, 0)],
+            tendons: [(name: \"T\", duct_mm: 45, line: [(0, -0.13, 0), (0.5, -0.13, 0), (1, -0.13, 0)],
                 prestress: (strands: 4, strand_mm2: 100, stress_mpa: 1300, at_days: 14, both_ends: {both_ends}))]))],
          supports: [(member: \"B\", place: Bottom, hold: Directions(x: false, y: true, z: true)), {held}]"
     );
