@@ -242,7 +242,7 @@ mod tests {
             "Beam(section: Rectangle(width_m: 0.4, depth_m: 0.4), length_m: 1.1,
                 reinforcement: (cover_mm: 35, bars: [Row(side_deg: 180, count: 4, diameter_mm: 12)], stirrups: (diameter_mm: 8, spacing_mm: 100)))",
             "(member: \"M\", place: Surface(from: 0.0909, to: 0.0909, side_deg: 180), hold: Directions(x: false, y: true, z: true)),
-             (member: \"M\", place: End, hold: Directions(x: true, y: false, z: false))",
+             (member: \"M\", place: End, hold: Symmetry)",
             "action: Force(place: Surface(from: 0.9, to: 1, side_deg: 0), force_kn: (0, -20, 0))",
         );
         let losses = lost(0.1, Estimate { value: 0.2, std_error: 0.05 });

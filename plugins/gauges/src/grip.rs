@@ -25,7 +25,7 @@ const WHOLE: usize = 1500;
 const OF_FACE: [f64; 4] = [4.0 / 36.0, 2.0 / 36.0, 1.0 / 36.0, 2.0 / 36.0];
 const OF_LINE: [f64; 2] = [2.0 / 6.0, 1.0 / 6.0];
 
-/// The held nodes of a member.
+/// The held nodes of a member that may give.
 #[derive(Debug, Clone)]
 pub(crate) struct Grip(Vec<Held>);
 
@@ -42,8 +42,7 @@ impl Grip {
     pub(crate) fn of(rig: &Rig) -> Self {
         let held = |component: u8| {
             let nodes: Vec<u32> = rig
-                .model
-                .holds
+                .giving
                 .iter()
                 .filter(|h| h.1 == component)
                 .map(|h| h.0)

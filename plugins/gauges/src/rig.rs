@@ -51,6 +51,8 @@ pub struct Rig {
     pub borders: Vec<Vec<(u32, f64)>>,
     /// What a user should know.
     pub notes: Vec<String>,
+    /// Of what is held, what may give: bearings do, planes of symmetry do not.
+    pub(crate) giving: Vec<(u32, u8)>,
     measures: Measures,
 }
 
@@ -126,6 +128,17 @@ pub fn face_at(place: DVec3) -> usize {
     }
 }
 
+/// What is held of a model, without the planes of symmetry where its axis starts and ends.
+fn giving(planes: [bool; 2], model: &Model, axes: Axes) -> Vec<(u32, u8)> {
+    let is_of_plane = |&(node, component): &(u32, u8)| {
+        let along = axes.local(model.mesh.nodes[node as usize]).z / axes.length;
+        let is_there = |face: f64| (along - face).abs() < 1e-6;
+        let is_across = axes.unit[2][usize::from(component)].abs() > 0.5;
+        is_across && planes.into_iter().zip([0.0, 1.0]).any(|(is, face)| is && is_there(face))
+    };
+    model.holds.iter().copied().filter(|held| !is_of_plane(held)).collect()
+}
+
 impl Rig {
     /// The rig of a member; none where no load test acts on it or no gauge sits on it.
     ///
@@ -156,6 +169,7 @@ impl Rig {
         let mut gauges = prepared.gauges;
         gauges.retain(|(_, gauge)| !matches!(gauge, Gauge::Stress(..)));
         let measures = Measures::of(body, &model);
+        let giving = giving(structure.mirrored(&body.id), &model, measures.axes);
         let tests = tests.iter().map(|t| t.name.clone()).collect();
         let mut rig = Self {
             member: member.to_owned(),
@@ -165,6 +179,7 @@ impl Rig {
             zones: Vec::new(),
             borders: Vec::new(),
             notes,
+            giving,
             measures,
         };
         (rig.zones, rig.borders) = rig.cut();
@@ -364,5 +379,17 @@ mod tests {
         assert_eq!(zone_at(DVec3::new(0.25, 0.1, 0.9)), 9);
         assert_eq!(zone_at(DVec3::new(0.999, -0.9, 0.1)), 38);
         assert_eq!(zone_at(DVec3::new(1.0, 0.0, -0.5)), 39);
+    }
+
+    /// What else holds the nodes of a plane of symmetry may give.
+    #[test]
+    fn planes_of_symmetry_do_not_give() {
+        let unit = [0.0, 1.0];
+        let mesh = intrados_mechanics::mesh::block(&unit, &unit, &unit, "beam").unwrap();
+        let holds = (0..8).flat_map(|node| (0..3).map(move |c| (node, c))).collect();
+        let model = Model { mesh, holds, ..Model::default() };
+        let axes = Axes { start: DVec3::ZERO, unit: [DVec3::Y, DVec3::Z, DVec3::X], length: 1.0 };
+        let left = |planes| giving(planes, &model, axes).len();
+        assert_eq!([left([false; 2]), left([true, false]), left([true; 2])], [24, 20, 16]);
     }
 }

@@ -64,7 +64,7 @@ pub enum Unknown {
 pub fn unknowns(rig: &Rig, priors: &Priors) -> Vec<(Unknown, f64)> {
     let loads = (0..rig.tests.len()).map(|t| (Unknown::Load(t), priors.load));
     let springs = springs(rig).into_iter().map(|k| (Unknown::Springs(k), priors.springs));
-    let give = (!rig.model.holds.is_empty()).then_some((Unknown::Give, priors.give));
+    let give = (!rig.giving.is_empty()).then_some((Unknown::Give, priors.give));
     let all =
         std::iter::once((Unknown::Modulus, priors.modulus)).chain(loads).chain(springs).chain(give);
     all.filter(|u| u.1 > 0.0).collect()

@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     element::hex8,
     limits::Limits,
-    member::{Part, Prepared},
+    member::{Part, Prepared, UP_TO_SYMMETRY},
     model::{
         CONDUCTED, Drive, Failure, History, March, MarchSettings, Point, Steel, SteelKind, Step,
         System, past_peak,
@@ -685,15 +685,18 @@ impl Observer for Pictures {
 }
 
 impl Strength {
-    /// Writes its curve as a table; where it was stopped, the last line says so.
+    /// Writes its curve as a table; where it was stopped or is that of a half, the last line says so.
     ///
     /// # Errors
     /// As [`write::csv`].
     pub fn write_curve(&self, path: &Path) -> Result<(), WriteError> {
         let row = |p: &CurvePoint| [p.displacement_m, p.load_factor, p.load_n, p.residual];
         let rows: Vec<[f64; 4]> = self.curve.iter().map(row).collect();
-        let note = if self.stopped { self.ended.as_str() } else { "" };
-        noted_csv(path, &["displacement_m", "load_factor", "load_n", "residual"], &rows, note)
+        let half = self.mirrored.then_some(UP_TO_SYMMETRY);
+        let notes: Vec<&str> =
+            half.into_iter().chain(self.stopped.then_some(self.ended.as_str())).collect();
+        let columns = ["displacement_m", "load_factor", "load_n", "residual"];
+        noted_csv(path, &columns, &rows, &notes.join("; "))
     }
 
     /// Draws its curve.
@@ -717,7 +720,8 @@ impl Strength {
             (title.to_owned(), format!("peak: {}", self.mode.words()))
         };
         curves.push(curve(&peak, &[self.peak], true));
-        write::plot(path, &title, ["displacement of the loaded nodes, mm", "load, kN"], &curves)
+        let load = if self.mirrored { "load up to the plane of symmetry, kN" } else { "load, kN" };
+        write::plot(path, &title, ["displacement of the loaded nodes, mm", load], &curves)
     }
 }
 

@@ -134,6 +134,7 @@ impl Case {
             parts,
             axis: None,
             direction: longest,
+            mirrored: Vec::new(),
             raised: None,
             gauges: Vec::new(),
             warnings: Vec::new(),

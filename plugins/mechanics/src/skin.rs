@@ -231,7 +231,7 @@ impl Skin {
 
     /// What of the damage is to be seen on the surface, by member of the model: a crack runs across
     /// a face where the largest tension within it is, and goes on where its neighbours' do; cover
-    /// has come off where concrete is crushed.
+    /// has come off where concrete is crushed. Planes of symmetry are no surface.
     #[must_use]
     pub fn surface_damage(
         &self,
@@ -243,6 +243,7 @@ impl Skin {
         let neighbours = mesh.neighbours();
         let outside = |f: &&Facet| {
             f.part != u32::MAX
+                && prepared.mirrored.binary_search(&f.face).is_err()
                 && self.is_there(f.face.hex, time)
                 && !f.behind.is_some_and(|b| self.is_there(b, time))
         };

@@ -95,6 +95,9 @@ pub struct Strength {
     pub because: String,
     /// Why it was followed no further.
     pub ended: String,
+    /// Whether it ends in a plane of symmetry: loads are those of what is computed up to there.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub mirrored: bool,
     /// Whether that is because somebody stopped it.
     #[serde(default)]
     pub stopped: bool,
@@ -567,6 +570,7 @@ impl<'a, 'm> Watch<'a, 'm> {
             mode,
             because,
             ended,
+            mirrored: !self.prepared.mirrored.is_empty(),
             stopped,
             curve: self.curve,
         })

@@ -195,6 +195,7 @@ impl Renumbered {
             model: self.model(&all.model, cut)?,
             parts: all.parts.iter().map(part).collect(),
             gauges: gauges.collect(),
+            mirrored: all.mirrored.iter().filter_map(|face| self.face(*face)).collect(),
             raised: None,
             ..all.clone()
         })

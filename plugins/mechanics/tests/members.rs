@@ -580,7 +580,7 @@ fn half_beam(loading: &str) -> Prepared {
         "members: [(id: \"B\", at: (0, 0, 0), concrete: \"C30/37\", body: Beam(section: Rectangle(width_m: 0.2, depth_m: 0.4), length_m: 1.1,
                 reinforcement: (cover_mm: 35, bars: [Row(side_deg: 180, count: 2, diameter_mm: 12)], stirrups: (diameter_mm: 8, spacing_mm: 100))))],
              supports: [(member: \"B\", place: Surface(from: 0.0909, to: 0.0909, side_deg: 180), hold: Directions(x: false, y: true, z: true)),
-                (member: \"B\", place: End, hold: Directions(x: true, y: false, z: false))],
+                (member: \"B\", place: End, hold: Symmetry)],
              loads: [(name: \"jack\", action: Force(place: Surface(from: 0.9, to: 1, side_deg: 0), force_kn: (0, -10, 0)), history: [(28, 0)], loading: {loading})]"
     ));
     first(&scene, 0.1)
@@ -658,6 +658,8 @@ fn what_is_stopped_is_kept_until_then() {
     found.write_curve(&file("curve.csv")).unwrap();
     found.plot_curve(&file("curve.svg"), "beam").unwrap();
     let read = |name: &str| std::fs::read_to_string(file(name)).unwrap();
-    assert!(read("curve.csv").ends_with("\n# it was stopped\n"), "{}", read("curve.csv"));
+    let last = "\n# what is symmetric is computed up to its plane of symmetry: weight, loads and forces are those of that part; it was stopped\n";
+    assert!(read("curve.csv").ends_with(last), "{}", read("curve.csv"));
     assert!(read("curve.svg").contains("beam: it was stopped"));
+    assert!(read("curve.svg").contains("load up to the plane of symmetry, kN"));
 }

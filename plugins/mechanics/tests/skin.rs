@@ -83,6 +83,7 @@ fn beam() -> Prepared {
         parts: vec![part],
         axis: None,
         direction: DVec3::X,
+        mirrored: vec![],
         raised: None,
         gauges: vec![],
         corrosion: Err(CorrosionError::NoBars),

@@ -7,7 +7,7 @@ mod modelled;
 use glam::{DVec3, Vec3};
 use intrados_mechanics::{
     frame::{MemberForces, SectionForces, Whole, whole},
-    member::{Meshing, prepare_within},
+    member::{Meshing, Prepared, prepare_within},
     model::Action,
 };
 use intrados_scene::{MemberKind, Mesh, Scene};
@@ -180,6 +180,20 @@ fn end_forces_follow_the_history_of_loads() {
     assert!(found.csv().lines().count() > 6);
 }
 
+/// Force and moment that all loads of a member leave, and the sum of their amounts.
+fn balance(prepared: &Prepared) -> (DVec3, DVec3, f64) {
+    let (mut force, mut moment, mut all) = (DVec3::ZERO, DVec3::ZERO, 0.0);
+    for load in &prepared.model.loads {
+        let Action::Nodes(nodes) = &load.action else { panic!("{}", load.name) };
+        for (node, f) in nodes {
+            force += *f;
+            moment += prepared.model.mesh.nodes[*node as usize].cross(*f);
+            all += f.length();
+        }
+    }
+    (force, moment, all)
+}
+
 /// What the others do to a member balances its own loads, on the nodes of its bricks, to rounding.
 #[test]
 fn a_member_takes_what_the_others_do_to_it() {
@@ -199,21 +213,39 @@ fn a_member_takes_what_the_others_do_to_it() {
         let handed = found.handed(id).unwrap();
         let prepared = prepare_within(&scene, assembly, Some(handed), meshing, &job).unwrap();
         assert_eq!(prepared.model.holds.len(), 6);
-        let (mut force, mut moment, mut all) = (DVec3::ZERO, DVec3::ZERO, 0.0);
-        for load in &prepared.model.loads {
-            let Action::Nodes(nodes) = &load.action else { panic!("{}", load.name) };
-            for (node, f) in nodes {
-                force += *f;
-                moment += prepared.model.mesh.nodes[*node as usize].cross(*f);
-                all += f.length();
-            }
-        }
+        let (force, moment, all) = balance(&prepared);
         assert!(
             force.length() < 1e-6 * all && moment.length() < 1e-5 * all,
             "{id} {force} {moment}"
         );
         assert!(all > 80e3, "{id} {all}");
     }
+}
+
+/// Half of the beam on bearings, its middle at the end of the axis: what holds it there turns
+/// nowhere and lifts nothing, q l²/8 − q a²/2 as a moment alone; the bricks of the half take it, too.
+#[test]
+fn half_of_a_beam_bears_as_all_of_it_does() {
+    let text = format!(
+        "members: [{}, {}], joints: [(of: (\"B\", \"A\"), kind: Bearing)],
+         supports: [(member: \"A\", place: Bottom, hold: Fixed), (member: \"B\", place: End, hold: Symmetry)], {LINE}",
+        column("A", 0.0),
+        beam("B", -0.2, 4.0)
+    );
+    let found = computed(&text, false);
+    let moment = 20e3 * (8.0 - 0.5 * 0.04);
+    assert!(near(up(&found, "A"), 84e3, 1e-6), "{}", up(&found, "A"));
+    assert!(near(at(member(&found, "B"), 4.2).m_z, moment, 1e-3));
+    let plane = found.reactions.iter().find(|r| r.member == "B").unwrap();
+    assert!(near(plane.moment_nm[2].abs(), moment, 1e-3), "{plane:?}");
+    assert!(plane.force_n.iter().all(|f| f.abs() < 1.0), "{plane:?}");
+    assert!(found.notes.iter().any(|n| n.contains("plane of symmetry")), "{:?}", found.notes);
+    let (scene, job) = (scene(&text), Job::default());
+    let assembly = scene.structure.assembly("B").unwrap();
+    let meshing = Meshing { element: Some(0.1) };
+    let prepared = prepare_within(&scene, assembly, found.handed("B"), meshing, &job).unwrap();
+    let (force, moment, all) = balance(&prepared);
+    assert!(force.length() < 1e-6 * all && moment.length() < 1e-5 * all, "{force} {moment}");
 }
 
 /// A pier with a head, as a model brings it: 3 m of .6 × .6 m, and .8 m of 2.4 × .6 m on top.

@@ -113,6 +113,21 @@ fn faults_are_named_with_their_place_and_remedy() {
         (reinforced("bars: [Around(count: 400, diameter_mm: 20)]"), "members[0].body.reinforcement.bars", "100 % of the section"),
         (column(", concrete: \"C30/20\""), "members[0].concrete", "C30/37"),
         ("    supports: [(member: \"X\", place: Start, hold: Fixed)],\n".into(), "supports[0].member", "there is none"),
+        (format!("{}{}", column(""), "    supports: [(member: \"C1\", place: Top, hold: Symmetry)],\n"), "supports[0].place", "write Start or End"),
+        (format!("{}{}", column(""), "    supports: [(member: \"C1\", place: Surface(from: 1, to: 1), hold: Symmetry)],\n"), "supports[0].place", "write Start or End"),
+        (format!("{}{}", column(""), "    supports: [(member: \"C1\", place: End, hold: Symmetry, alone: true)],\n"), "supports[0].alone", "own other half"),
+        (
+            "    models: [(file: \"a.glb\")], supports: [(member: \"W\", place: End, hold: Symmetry)],\n".into(),
+            "supports[0].hold",
+            "by Directions",
+        ),
+        (
+            "    members: [(id: \"T\", body: Tunnel(radius_m: 2, length_m: 4, inner_lining: (thickness_m: 0.3), \
+             pipe: (thickness_mm: 20, cushion_mm: 30, cushion_mpa: 1000)))], supports: [(member: \"T\", place: End, hold: Symmetry)],\n"
+                .into(),
+            "supports[0].hold",
+            "place: Pipe(0)",
+        ),
         (format!("{}{}", column(""), "    joints: [(of: (\"C1\", \"Y\"), kind: Hinge)],\n"), "joints[0].of.1", "there are C1"),
         (format!("{}{}", column(""), "    joints: [(of: (\"C1\", \"C1\"), kind: Bearing)],\n"), "joints[0].of", "with itself"),
         ("    readings: [(of: \"g\", value: 1, std_error: 1)],\n".into(), "readings[0].of", "no gauge"),

@@ -582,16 +582,7 @@ fn grounds(p: usize, part: &Part, place: &Place, hold: &Hold, rigid: &Groups) ->
     let of = |(root, samples): (usize, Vec<Sample>)| {
         let area: f64 = samples.iter().map(|s| s.area).sum();
         let middle = samples.iter().map(|s| s.area / area * s.at).sum::<DVec3>();
-        let held = match *hold {
-            Hold::Fixed => [true; 3],
-            Hold::Directions { x, y, z } => [x, y, z],
-            Hold::Springs { .. } => [false; 3],
-        };
-        let axes = [DVec3::X, DVec3::Y, DVec3::Z];
-        let mut holds: Vec<(bool, DVec3)> =
-            (0..3).filter(|&i| held[i]).map(|i| (false, axes[i])).collect();
-        let turns = turned(&samples, middle, held);
-        holds.extend(turns.into_iter().map(|axis| (true, axis)));
+        let holds = held(part, hold, &samples, middle);
         let mut springs = [0.0; 6];
         if let Hold::Springs { stiffness_mpa_m, .. } = hold {
             let k = 1e6 * stiffness_mpa_m.as_dvec3();
@@ -607,6 +598,23 @@ fn grounds(p: usize, part: &Part, place: &Place, hold: &Hold, rigid: &Groups) ->
         Ground { part: p, root, middle, holds, springs }
     };
     by_root.into_iter().map(of).collect()
+}
+
+/// The directions in which a support holds a body, and about which it does not let it turn.
+fn held(part: &Part, hold: &Hold, samples: &[Sample], middle: DVec3) -> Vec<(bool, DVec3)> {
+    let held = match *hold {
+        Hold::Fixed => [true; 3],
+        Hold::Directions { x, y, z } => [x, y, z],
+        Hold::Symmetry => {
+            // However thin its section is.
+            let [zero, ninety, along] = part.axes.unit;
+            return vec![(false, along), (true, zero), (true, ninety)];
+        }
+        Hold::Springs { .. } => [false; 3],
+    };
+    let axes = [DVec3::X, DVec3::Y, DVec3::Z].into_iter().zip(held).filter(|axis| axis.1);
+    let turns = turned(samples, middle, held).into_iter().map(|axis| (true, axis));
+    axes.map(|(axis, _)| (false, axis)).chain(turns).collect()
 }
 
 /// About which axes a body cannot turn whose samples are held in these directions of the world:

@@ -14,7 +14,7 @@ use super::{
 };
 use crate::member::{Handed, HandedLoad, Push};
 
-/// Forces below this share of a member's largest are rounding: nothing is joined there.
+/// Forces and moments below this share of a member's largest are rounding: nothing is joined there.
 const NOTHING: f64 = 1e-9;
 
 /// Of every member that bears, by id.
@@ -32,8 +32,14 @@ pub(super) fn over(
         let acting = Acting::new(built, case);
         for (&p, touches) in bears.iter().zip(&touches) {
             let sums = taken(built, p, case, &acting, found);
-            let most = sums.values().map(|[force, _]| force.length()).fold(0.0, f64::max);
-            let joined = sums.into_iter().filter(|(_, [force, _])| force.length() > NOTHING * most);
+            let most = |i: usize| sums.values().map(|acts| acts[i].length()).fold(0.0, f64::max);
+            // A plane of symmetry may take a moment alone, which is none beside those of forces
+            // along the member.
+            let force = most(0);
+            let least = [force, most(1).max(force * draft.parts[p].axes.length)];
+            let joined = sums.into_iter().filter(move |(_, acts)| {
+                acts.iter().zip(least).any(|(acts, least)| acts.length() > NOTHING * least)
+            });
             let push = |(node, [force, moment]): (u32, [DVec3; 2])| {
                 let at = built.model.nodes[node as usize];
                 let touches = touches.get(&node).cloned().unwrap_or_else(|| vec![(at, 1.0)]);

@@ -21,7 +21,7 @@ use super::{
     model::{Case, Equilibrium, FrameError, System},
     shape::Shape,
 };
-use crate::member::{GRAVITY, Handed};
+use crate::member::{GRAVITY, Handed, UP_TO_SYMMETRY};
 
 /// The whole structure, computed.
 #[derive(Debug, Clone, Serialize)]
@@ -278,6 +278,10 @@ fn tell_assumptions(draft: &mut Draft) {
         draft.notes.push(format!(
             "{touching} joints by touching alone are monolithic: name bearings and hinges in joints of the scene"
         ));
+    }
+    let mirrored = draft.parts.iter().map(|p| draft.scene.structure.mirrored(&p.assembly.id));
+    if mirrored.flatten().any(|is_plane| is_plane) {
+        draft.notes.push(UP_TO_SYMMETRY.into());
     }
     let steel = draft
         .parts

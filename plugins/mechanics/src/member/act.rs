@@ -5,7 +5,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use glam::DVec3;
 use intrados_scene::structure::{self, Body as Shape, GroundModel, Hold, Place};
 
-use super::{Along, Draft, MemberError, Raised, Reach, body::LINING, raised_by, warmth::Air};
+use super::{
+    Along, Draft, MemberError, Raised, Reach, anchor::END, body::LINING, raised_by, warmth::Air,
+};
 use crate::{
     element::spring::Winkler,
     material::{DAY, YEAR},
@@ -26,6 +28,10 @@ const GROWTH: f64 = 1.5;
 const LOOKS: f64 = 0.7;
 /// First step after an event, s.
 const FIRST: f64 = DAY;
+/// Cosine from which on a member lies along an axis of the world: single precision turns it less.
+const ALONG: f64 = 1.0 - 1e-8;
+/// Said of what is computed up to a plane of symmetry.
+pub(crate) const UP_TO_SYMMETRY: &str = "what is symmetric is computed up to its plane of symmetry: weight, loads and forces are those of that part";
 
 impl Draft<'_> {
     /// Ground on the outermost face.
@@ -113,6 +119,7 @@ impl Draft<'_> {
             let held: [bool; 3] = match support.hold {
                 Hold::Fixed => [true; 3],
                 Hold::Directions { x, y, z } => [x, y, z],
+                Hold::Symmetry => self.across_symmetry(&support.place)?,
                 Hold::Springs { .. } => [false; 3],
             };
             let components = (0..3).filter(|&c| held[c]).map(|c| c as u8);
@@ -130,6 +137,34 @@ impl Draft<'_> {
             return Err(self.unsupported(what));
         }
         Ok(())
+    }
+
+    /// The direction of the world that a plane of symmetry at this end holds.
+    fn across_symmetry(&self, place: &Place) -> Result<[bool; 3], MemberError> {
+        let held = self.axes.unit[2].to_array().map(|cosine| cosine.abs() > ALONG);
+        if held.contains(&true) {
+            return Ok(held);
+        }
+        Err(self.unsupported(format!(
+            "its plane of symmetry ({place:?}) lies askew in the world: turn the member along x, y or z"
+        )))
+    }
+
+    /// Faces in its planes of symmetry, in order: concrete goes on there.
+    pub(super) fn mirrored(&self) -> Vec<HexFace> {
+        let planes = self.scene.structure.mirrored(&self.member.id);
+        let places = [Place::Start, Place::End].into_iter().zip(planes);
+        let mut faces: Vec<HexFace> =
+            places.filter(|p| p.1).flat_map(|(place, _)| self.faces(&place)).collect();
+        faces.sort_unstable();
+        faces
+    }
+
+    /// Whether a place is in a plane of symmetry, and not only near to it.
+    pub(super) fn is_mirrored(&self, at: DVec3) -> bool {
+        let along = self.axes.local(at).z / self.axes.length;
+        let planes = self.scene.structure.mirrored(&self.member.id).into_iter().zip([0.0, 1.0]);
+        planes.filter(|p| p.0).any(|(_, face)| (along - face).abs() < END)
     }
 
     /// Loads of the scene.

@@ -30,8 +30,8 @@ const PITCH: f64 = 0.05;
 const TURN: usize = 12;
 /// Of spirals, Pa: yield stress, and what it is designed with.
 const YIELD: [f64; 2] = [500e6, 500e6 / 1.15];
-/// How near to an end of the axis, as a share of it, a tendon is anchored in that end.
-const END: f64 = 1e-4;
+/// How near to an end of the axis, as a share of it, a tendon ends in that end.
+pub(super) const END: f64 = 1e-4;
 
 /// An end of a tendon.
 struct End {
@@ -66,6 +66,10 @@ impl Draft<'_> {
                 let Some(piece) = (if which == 0 { pieces.first() } else { pieces.last() }) else {
                     continue;
                 };
+                if !self.is_tunnel() && self.is_mirrored(piece.ends[which]) {
+                    // It runs on: nothing is anchored there.
+                    continue;
+                }
                 let along = (piece.ends[1] - piece.ends[0]).normalize_or_zero();
                 let end = self.end(
                     piece.ends[which],

@@ -15,7 +15,7 @@ pub(crate) mod matter;
 mod steel;
 mod warmth;
 
-pub(crate) use act::GRAVITY;
+pub(crate) use act::{GRAVITY, UP_TO_SYMMETRY};
 pub use handed::Handed;
 pub(crate) use handed::{HandedLoad, Push};
 pub use matter::{ElasticMatter, elastic};
@@ -32,7 +32,7 @@ use crate::{
         durability::{Corrosion, CorrosionError},
     },
     mesh::{
-        MeshError,
+        HexFace, MeshError,
         voxel::{GeometricError, VoxelError},
     },
     model::{Failure, Gauge, Model},
@@ -64,6 +64,8 @@ pub struct Prepared {
     pub axis: Option<[DVec3; 2]>,
     /// Along the member, of length 1.
     pub direction: DVec3,
+    /// Faces in planes of symmetry, in order: what is computed ends there, concrete does not.
+    pub mirrored: Vec<HexFace>,
     /// Loads that are raised after its life until it fails.
     pub raised: Option<Raised>,
     /// Gauges by name.
@@ -416,10 +418,15 @@ impl<'a> Draft<'a> {
         let begin = times.first().copied().unwrap_or(0.0);
         let attacked = self.birth();
         let (raised, direction) = (self.raised(), self.axes.unit[2]);
+        let mirrored = self.mirrored();
+        if !mirrored.is_empty() {
+            self.notes.push(UP_TO_SYMMETRY.into());
+        }
         Ok(Prepared {
             id: self.id(),
             axis,
             direction,
+            mirrored,
             raised,
             model: self.model,
             begin,

@@ -55,7 +55,7 @@ impl Draft<'_> {
     /// lead on into its neighbours, and cubes stand off its surface a little.
     fn within(&mut self, locator: &Locator, mesh: &Mesh) -> Vec<SteelLine> {
         if self.member.body.is_some() {
-            return self.member.steel.clone();
+            return self.member.steel.iter().map(|line| self.run_through(line)).collect();
         }
         let find = |p: DVec3| locator.locate(p).map(|host| (host.hex as usize, host.natural));
         let leaves = |run: &[DVec3]| match embed(run, find, |h| mesh.corners(h as u32)) {
@@ -99,8 +99,8 @@ impl Draft<'_> {
         // Round members are meshed by chords: what lies outside of them by less than a hair's
         // breadth is drawn in.
         let mut points: Vec<DVec3> = line.line.iter().map(|p| self.inward(p.as_dvec3())).collect();
-        if line.part == Part::Bar && self.member.body.is_some() {
-            self.go_on(&mut points, line.ends);
+        if self.member.body.is_some() {
+            self.go_on(&mut points, line);
         }
         let find = |p: DVec3| locator.locate(p).map(|host| (host.hex as usize, host.natural));
         let embedded = embed(&points, find, corners);
@@ -153,7 +153,7 @@ impl Draft<'_> {
         pieces: Vec<Piece>,
     ) -> Result<Steel, MemberError> {
         let grade = StrandGrade::named(&stressing.steel).ok_or_else(|| self.without_grade(line))?;
-        let tendon = jacked(stressing, grade);
+        let tendon = jacked(stressing, grade, self.jack(line, stressing, points)?);
         let failed =
             |source| MemberError::Prestress { id: self.id(), line: line.name.clone(), source };
         let path = Path::curve(&points.iter().map(|p| p.to_array()).collect::<Vec<_>>())
@@ -187,6 +187,31 @@ impl Draft<'_> {
             bond: None,
             displaces: true,
         })
+    }
+
+    /// Where a tendon is stressed from: what runs through a plane of symmetry, from its other end,
+    /// as its mirror image is at the same time.
+    fn jack(
+        &self,
+        line: &SteelLine,
+        stressing: &Prestress,
+        points: &[DVec3],
+    ) -> Result<Jack, MemberError> {
+        let through =
+            |at: Option<&DVec3>| !self.is_tunnel() && at.is_some_and(|at| self.is_mirrored(*at));
+        match ([through(points.first()), through(points.last())], stressing.both_ends) {
+            ([false, false], false) | ([false, true], true) => Ok(Jack::First),
+            ([false, false], true) => Ok(Jack::Both),
+            ([true, false], true) => Ok(Jack::Last),
+            ([true, true], _) => Err(self.unsupported(format!(
+                "{}: it runs from one plane of symmetry to another, so that nothing stresses it: compute all of the member, or hold one end by Directions",
+                line.name
+            ))),
+            (_, false) => Err(self.unsupported(format!(
+                "{}: it runs through a plane of symmetry, and stressed from one end it is not symmetric: write both_ends: true, or compute all of the member",
+                line.name
+            ))),
+        }
     }
 
     /// How a bar slips where the scene asks for it: good conditions, ribs .6 of a diameter apart.
@@ -289,38 +314,67 @@ impl Draft<'_> {
         line.iter().zip(drawn).map(moved).collect()
     }
 
+    /// A line as it runs through planes of symmetry: where it does, its end is none, whatever the
+    /// scene says of it.
+    fn run_through(&self, line: &SteelLine) -> SteelLine {
+        let planes = self.scene.structure.mirrored(&self.member.id);
+        let mut ends = line.ends;
+        for (end, at) in ends.iter_mut().zip([line.line.first(), line.line.last()]) {
+            let is_near = |face: usize| at.is_some_and(|at| self.is_near(at.as_dvec3(), face));
+            if (0..2).any(|face| planes[face] && is_near(face)) {
+                *end = BarEnd::Anchored;
+            }
+        }
+        SteelLine { ends, ..line.clone() }
+    }
+
     /// A bar that ends near a face which is held along the axis, and not straight there, runs into
-    /// that: into a footing that it starts from, or into the other half of a symmetric member.
-    fn go_on(&self, points: &mut [DVec3], ends: [BarEnd; 2]) {
-        let along = self.axes.unit[2];
-        let held = |place: &Place| {
-            let of_member =
-                |s: &&structure::Support| s.member == self.member.id && s.place == *place;
-            self.scene.structure.supports.iter().filter(of_member).any(|s| match s.hold {
-                Hold::Fixed => true,
-                Hold::Directions { x, y, z } => {
-                    let held = [x, y, z].map(|held| f64::from(u8::from(held)));
-                    along.abs().dot(DVec3::from_array(held)) > 0.99
-                }
-                Hold::Springs { .. } => false,
-            })
+    /// that: into a footing that it starts from, or into the other half of a symmetric member, as
+    /// tendons do.
+    fn go_on(&self, points: &mut [DVec3], line: &SteelLine) {
+        let held = match line.part {
+            Part::Bar => self.held_along(),
+            Part::Tendon if !self.is_tunnel() => self.scene.structure.mirrored(&self.member.id),
+            _ => return,
         };
         let length = self.axes.length;
-        for (place, face) in [(Place::Start, 0.0), (Place::End, length)] {
-            let near =
-                |p: &&mut DVec3| (self.axes.local(**p).z - face).abs() < REACHES.min(0.1 * length);
-            if !held(&place) {
-                continue;
-            }
-            let last = points.len() - 1;
-            for (at, _) in [0, last].into_iter().zip(ends).filter(|(_, e)| *e != BarEnd::Straight) {
-                if let Some(point) = points.get_mut(at).filter(near) {
+        let last = points.len().saturating_sub(1);
+        for face in (0..2).filter(|&face| held[face]) {
+            let z = if face == 0 { 0.0 } else { length };
+            let ends = [0, last].into_iter().zip(line.ends);
+            for (at, _) in ends.filter(|(_, e)| *e != BarEnd::Straight) {
+                if let Some(point) = points.get_mut(at).filter(|p| self.is_near(**p, face)) {
                     let mut local = self.axes.local(*point);
-                    local.z = face.clamp(1e-6 * length, (1.0 - 1e-6) * length);
+                    local.z = z.clamp(1e-6 * length, (1.0 - 1e-6) * length);
                     *point = self.axes.world(local);
                 }
             }
         }
+    }
+
+    /// Whether something holds the face where its axis starts, and that where it ends, along it.
+    fn held_along(&self) -> [bool; 2] {
+        let along = self.axes.unit[2];
+        let holds = |s: &structure::Support| match s.hold {
+            Hold::Fixed | Hold::Symmetry => true,
+            Hold::Directions { x, y, z } => {
+                let held = [x, y, z].map(|held| f64::from(u8::from(held)));
+                along.abs().dot(DVec3::from_array(held)) > 0.99
+            }
+            Hold::Springs { .. } => false,
+        };
+        [Place::Start, Place::End].map(|place| {
+            let all = self.scene.structure.supports.iter();
+            all.filter(|s| s.member == self.member.id && s.place == place).any(holds)
+        })
+    }
+
+    /// Whether a place is so near to the face where the axis starts (0) or ends (1) that what ends
+    /// there reaches it.
+    fn is_near(&self, at: DVec3, face: usize) -> bool {
+        let length = self.axes.length;
+        let z = if face == 0 { 0.0 } else { length };
+        (self.axes.local(at).z - z).abs() < REACHES.min(0.1 * length)
     }
 
     /// The point, drawn towards the axis a little.
@@ -454,7 +508,7 @@ impl Skin {
 }
 
 /// A tendon of the scene as one that is jacked.
-fn jacked(p: &Prestress, grade: StrandGrade) -> prestress::Tendon {
+fn jacked(p: &Prestress, grade: StrandGrade, jack: Jack) -> prestress::Tendon {
     let pascal = |mpa: f32| f64::from(mpa) * 1e6;
     prestress::Tendon {
         strand: Strand {
@@ -472,7 +526,7 @@ fn jacked(p: &Prestress, grade: StrandGrade) -> prestress::Tendon {
         friction: f64::from(p.friction),
         wobble: f64::from(p.wobble_per_m),
         slip: f64::from(p.slip_mm) / 1000.0,
-        jack: if p.both_ends { Jack::Both } else { Jack::First },
+        jack,
     }
 }
 

@@ -120,7 +120,8 @@ impl Draft<'_> {
         self.model.mesh.regions.iter().zip(&self.model.bodies).map(one).collect()
     }
 
-    /// Air on all faces; the portals of a tunnel, which goes on there, let no heat through.
+    /// Air on all faces; planes of symmetry, and the portals of a tunnel, which goes on there, let
+    /// no heat through.
     fn films(&self, span: [f64; 2]) -> Vec<Film> {
         let mesh = &self.model.mesh;
         let sided: Vec<(HexFace, usize)> = if self.is_tunnel() {
@@ -134,7 +135,11 @@ impl Draft<'_> {
                     mesh.face_middle(face).1.normalize_or_zero().dot(self.axes.unit[0]) < 0.7,
                 )
             };
-            mesh.outer_faces().into_iter().map(|face| (face, side(face))).collect()
+            let mirrored = self.mirrored();
+            let open = mesh.outer_faces().into_iter();
+            open.filter(|face| mirrored.binary_search(face).is_err())
+                .map(|face| (face, side(face)))
+                .collect()
         };
         let mut moments: Vec<f64> =
             self.air.iter().flat_map(|a| a.history.iter().map(|h| h.0)).chain(span).collect();

@@ -37,7 +37,7 @@ fn scene(axial: f64) -> String {
             ], stirrups: (diameter_mm: 8, spacing_mm: 100))))],
         supports: [
             (member: "C", place: Surface(from: {support}, to: {support}, side_deg: 180), hold: Directions(x: false, y: true, z: true)),
-            (member: "C", place: End, hold: Directions(x: true, y: false, z: false)),
+            (member: "C", place: End, hold: Symmetry),
         ],
         loads: [
             (name: "axial", action: Force(place: Start, force_kn: ({axial}, 0, 0)), history: [(27.9, 0), (28, 1)]),

@@ -139,7 +139,7 @@ fn scene(beam: &Beam) -> String {
             ], stirrups: (diameter_mm: {4}, spacing_mm: {spacing}, f_y_mpa: {5}))))],
         supports: [
             (member: "B", place: Surface(from: {support}, to: {support}, side_deg: 180), hold: Directions(x: false, y: true, z: true)),
-            (member: "B", place: End, hold: Directions(x: true, y: false, z: false)),
+            (member: "B", place: End, hold: Symmetry),
         ],
         loads: [(name: "jack", action: Force(place: Surface(from: {plate}, to: 1, side_deg: 0), force_kn: (0, -50, 0)), history: [(28, 0)])],
         )"#,

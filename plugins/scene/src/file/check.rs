@@ -1,6 +1,6 @@
 //! Everything that can be wrong with a scene that is well-formed RON.
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 
 use glam::Vec3;
 
@@ -93,6 +93,7 @@ pub fn check(scene: &SceneFile) -> Vec<Problem> {
         c.problems.extend(unknown_members(scene, ids.iter().map(String::as_str)));
     }
     c.problems.extend(unknown_scanners(scene));
+    c.problems.extend(unlike_halves(scene));
     c.problems.truncate(MAX_PROBLEMS);
     c.problems
 }
@@ -130,6 +131,28 @@ fn unknown_scanners(scene: &SceneFile) -> Vec<Problem> {
     }
     wrong.truncate(MAX_PROBLEMS);
     wrong
+}
+
+/// Planes of symmetry of members that cannot be halved by them.
+fn unlike_halves(scene: &SceneFile) -> Vec<Problem> {
+    let told = scene.details.iter().filter_map(|d| Some((&d.member, d.body.as_ref()?)));
+    let bodies: HashMap<&String, &Body> =
+        scene.members.iter().map(|m| (&m.id, &m.body)).chain(told).collect();
+    let mirrored =
+        scene.supports.iter().enumerate().filter(|(_, support)| support.hold == Hold::Symmetry);
+    let wrong = mirrored.filter_map(|(i, support)| {
+        let why = match bodies.get(&support.member) {
+            None => {
+                "only a member of which a body is told (in members, or in details) has a plane of symmetry: hold this one by Directions"
+            }
+            Some(Body::Tunnel { pipe: Some(_), .. }) => {
+                "a steel pipe is not halved: hold the tunnel here by Directions, and its pipe by place: Pipe(0) or Pipe(1)"
+            }
+            Some(_) => return None,
+        };
+        Some(Problem::error(format!("supports[{i}].hold"), "NO_SYMMETRY", why))
+    });
+    wrong.take(MAX_PROBLEMS).collect()
 }
 
 /// References to members that are not among `ids`.
@@ -1358,6 +1381,7 @@ impl Checker<'_> {
                     self.error("hold", "EMPTY", "holds no direction: set x, y or z");
                 }
             }
+            Hold::Symmetry => self.symmetry(s),
             Hold::Springs { stiffness_mpa_m, .. } => {
                 self.colour("hold.stiffness_mpa_m", stiffness_mpa_m, 1e9);
                 if stiffness_mpa_m == Vec3::ZERO {
@@ -1368,6 +1392,17 @@ impl Checker<'_> {
                     );
                 }
             }
+        }
+    }
+
+    fn symmetry(&mut self, s: &Support) {
+        if !matches!(s.place, Place::Start | Place::End) {
+            let message = "a plane of symmetry is where a member starts or ends: write Start or End, or hold this place by Directions";
+            self.error("place", "NO_SYMMETRY", message);
+        }
+        if s.alone {
+            let message = "a plane of symmetry stands for the member's own other half, not for other members: leave it out";
+            self.error("alone", "NO_SYMMETRY", message);
         }
     }
 

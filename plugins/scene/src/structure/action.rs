@@ -75,6 +75,15 @@ pub enum Hold {
         #[serde(default)]
         lifts: bool,
     },
+    /// By its mirror image: its place, `Start` or `End`, is a plane of symmetry, and half of the
+    /// member is computed. The section stays plane and moves within its plane alone. No heat and
+    /// nothing that attacks steel comes through it, and a crack in it is not seen. Bars that end
+    /// within 100 mm of it run on through it and do not slip there, whatever their `ends`; so do
+    /// tendons, which are stressed from their other end: `both_ends` says so of the whole, whose
+    /// friction is largest in the plane. Weight, loads and what the member bears are those of the
+    /// half, and what acts on the face itself counts within its plane alone. Nothing is found that
+    /// is not symmetric, such as buckling into an S.
+    Symmetry,
 }
 
 /// How two members are joined. Members that touch are monolithic where nothing else is said.

@@ -385,7 +385,7 @@ pub struct Prestress {
     /// Relaxation class of Eurocode 2, 1 to 3.
     #[serde(default = "relaxation")]
     pub relaxation_class: u8,
-    /// Whether it is stressed from both ends.
+    /// Whether it is stressed from both ends, as what runs through a plane of symmetry is.
     #[serde(default)]
     pub both_ends: bool,
     /// Whether the duct is grouted.

@@ -196,6 +196,16 @@ impl Structure {
         self.supports.iter().any(|s| s.member == id)
     }
 
+    /// Whether the axis of the assembly of that id starts, and whether it ends, in a plane of
+    /// symmetry.
+    #[must_use]
+    pub fn mirrored(&self, id: &str) -> [bool; 2] {
+        [Place::Start, Place::End].map(|place| {
+            let mut own = self.supports.iter().filter(|s| s.member == id && s.place == place);
+            own.any(|s| s.hold == Hold::Symmetry)
+        })
+    }
+
     /// Whether its members bear as one: somebody has said how they are joined, or a support is only
     /// there for members by themselves. Else each is computed as its own supports hold it.
     #[must_use]
