@@ -251,6 +251,14 @@ impl<const B: usize> Solver<B> {
         self.fell_back
     }
 
+    /// Lets go of a factor, which [`Solver::update`] makes anew in any case and which must come
+    /// before the next solution. A hierarchy stays.
+    pub(crate) fn release(&mut self) {
+        if let Engine::Factor(_) = self.engine {
+            self.engine = Engine::Jacobi(Vec::new());
+        }
+    }
+
     /// Takes new values of the matrix (same pattern) and new constraints. A factor is made anew; a
     /// hierarchy is kept, with its smoother brought up to date, until it needs half as many
     /// iterations again as when it was new.
