@@ -50,6 +50,22 @@ pub enum Method {
 }
 
 impl Method {
+    /// What it chooses by, in words.
+    #[must_use]
+    pub fn words(self) -> String {
+        match self {
+            Self::Auto => format!(
+                "direct up to {SMALL} unknowns, else multigrid, and up to {FACTORABLE} direct where that gives up"
+            ),
+            Self::Once => format!(
+                "direct up to {SMALL} unknowns, else multigrid, and up to {FACTORABLE} direct where that costs less or multigrid gives up"
+            ),
+            Self::Direct => "direct".into(),
+            Self::Multigrid => "multigrid".into(),
+            Self::Jacobi => "jacobi".into(),
+        }
+    }
+
     /// Whether what solves may change.
     fn may_change(self) -> bool {
         matches!(self, Self::Auto | Self::Once)
