@@ -393,7 +393,9 @@ impl<const B: usize> Solver<B> {
         let cost = || elimination.cost(matrix);
         let is_worth_asking = self.method == Method::Once && rhs.len() <= FACTORABLE;
         // What rounding makes of the recurrence is repaired from the true residual, as long as that
-        // gains anything.
+        // gains anything. Sums in more digits would gain no more: the exact solution itself, once it
+        // is rounded to doubles, leaves 5e-6 of the load of a clamped row of 1000 squares, 6e-5 of
+        // one of 2000.
         while reached > goal && iterations < limit {
             let until = Until {
                 goal: 0.7 * goal,
