@@ -54,7 +54,7 @@ struct Report {
     scene_hash: String,
     dof: usize,
     elements: usize,
-    solver: &'static str,
+    solver: String,
     iterations: usize,
     cpu_seconds: f64,
     peak_memory_bytes: Option<u64>,
@@ -172,7 +172,7 @@ fn as_one(session: &Session, args: &args::Analyze) -> Result<Outcome, Failure> {
         scene_hash: scene.hash.clone(),
         dof: found.unknowns,
         elements: found.beams + found.plates,
-        solver: "direct",
+        solver: "direct".into(),
         cpu_seconds: cpu_seconds() - begin,
         peak_memory_bytes: peak_memory(),
         ..Report::default()
@@ -211,12 +211,17 @@ fn told(session: &Session, report: &Report) -> Result<Outcome, Failure> {
 }
 
 impl Work {
-    fn settings(&self, args: &args::Analyze) -> MarchSettings {
-        let usual = if self.is_scene || self.prepared.iter().any(cracks) {
+    /// How it is computed unless somebody asks otherwise.
+    fn usual(&self) -> MarchSettings {
+        if self.is_scene || self.prepared.iter().any(cracks) {
             MarchSettings::of_life()
         } else {
             MarchSettings::of_deck()
-        };
+        }
+    }
+
+    fn settings(&self, args: &args::Analyze) -> MarchSettings {
+        let usual = self.usual();
         MarchSettings { tolerance: args.tolerance.unwrap_or(usual.tolerance), ..usual }
     }
 
@@ -584,7 +589,7 @@ impl Default for Report {
             scene_hash: String::new(),
             dof: 0,
             elements: 0,
-            solver: "",
+            solver: String::new(),
             iterations: 0,
             cpu_seconds: 0.0,
             peak_memory_bytes: None,
@@ -603,12 +608,17 @@ impl Report {
     fn new(work: &Work, models: Vec<Life>, cpu_seconds: f64) -> Self {
         let longest =
             models.iter().max_by(|a, b| a.steps.len().cmp(&b.steps.len())).map(|m| m.steps.clone());
+        let solved = models.iter().flat_map(|m| m.solver.split(", ")).filter(|s| !s.is_empty());
+        let solved = match &Vec::from_iter(solved.collect::<BTreeSet<_>>())[..] {
+            [] => "nothing had to be solved".into(),
+            names => names.join(", "),
+        };
         Self {
             scene: work.name.clone(),
             scene_hash: work.hash.clone(),
             dof: models.iter().map(|m| m.dof).sum(),
             elements: models.iter().map(|m| m.elements).sum(),
-            solver: "auto (direct below 6000 unknowns, else multigrid)",
+            solver: format!("{solved} (rule: {})", work.usual().method.words()),
             iterations: models.iter().map(|m| m.iterations).sum(),
             cpu_seconds,
             peak_memory_bytes: peak_memory(),

@@ -42,6 +42,9 @@ pub struct Outcome {
     pub gauges: Vec<GaugeOutcome>,
     /// Iterations of linear solvers, in all.
     pub iterations: usize,
+    /// What solved its linear systems, by name.
+    #[serde(default)]
+    pub solver: String,
     /// What a crack leaves and what gives it its width; none where nothing can crack.
     pub cracks: Option<String>,
     /// What was asked for.
@@ -253,6 +256,7 @@ pub fn analyze_until_stopped(
         members: prepared.parts.iter().map(MemberOutcome::new).collect(),
         gauges: Vec::new(),
         iterations: 0,
+        solver: String::new(),
         cracks: model.cracking(),
         tolerance: settings.tolerance,
         complaint: String::new(),
@@ -270,9 +274,9 @@ pub fn analyze_until_stopped(
         let result = loop {
             let goes_on = job.step(i, prepared.times.len()).map_err(Failure::from);
             let result = goes_on.and_then(|()| {
-                march.advance(time, 0.0, job, |history, step| {
-                    let points = structure.all_points(history)?;
-                    limits.see(&structure, history, step, &points, step.time >= last, job)?;
+                march.advance_with(time, 0.0, job, |history, step, equations| {
+                    let (points, is_last) = (structure.all_points(history)?, step.time >= last);
+                    limits.see(&structure, history, step, &points, is_last, equations, job)?;
                     outcome.take(prepared, history, step, &points);
                     steel.take(&structure, history)?;
                     observer.see(&structure, history, step, &points)
@@ -338,6 +342,7 @@ pub fn analyze_until_stopped(
             .warnings
             .push("multigrid did not converge: its systems were factorised instead".into());
     }
+    outcome.solver = march.solved_by();
     let history = march.history;
     steel.tell(prepared, &history, &mut outcome);
     let readings =

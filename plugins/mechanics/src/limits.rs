@@ -6,7 +6,7 @@ use intrados_stage::time::DAY;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    model::{Failure, History, Matter, Point, Step, System},
+    model::{Equations, Failure, History, Point, Step, System},
     tensor::Principal,
 };
 
@@ -54,15 +54,9 @@ pub(crate) struct Limits {
 
 impl Limits {
     pub(crate) fn new(structure: &System) -> Self {
-        let elastic = structure
-            .model
-            .bodies
-            .iter()
-            .all(|b| matches!(b.matter, Matter::Elastic(_) | Matter::Shell { .. }));
-        let elastic = elastic && structure.model.steel.is_empty();
         Self {
             length: longest(structure),
-            elastic,
+            elastic: structure.model.is_elastic(),
             looked: [0.0; 2],
             nearest: None,
             moved: 0.0,
@@ -70,6 +64,8 @@ impl Limits {
         }
     }
 
+    /// Sees an equilibrium that was found with these equations.
+    ///
     /// # Errors
     /// [`Failure::Beyond`]: the member has moved too far or has buckled; and whatever else fails.
     pub(crate) fn see(
@@ -79,6 +75,7 @@ impl Limits {
         step: &Step,
         points: &[[Point; 8]],
         is_last: bool,
+        equations: &mut Equations,
         job: &Job,
     ) -> Result<(), Failure> {
         self.moved = self.moved.max(spread(structure, history) / self.length);
@@ -94,7 +91,7 @@ impl Limits {
         let [before, share] = self.looked;
         let due = if share < FAR { 2.0 } else { NEXT };
         if pressed > 0.0 && (before == 0.0 || pressed > due * before || is_last) {
-            self.look(structure, history, step, points, job)?;
+            self.look(structure, history, step, points, equations, job)?;
             self.looked = [pressed.max(before), self.nearest.map_or(0.0, |s| s.load_over_critical)];
         }
         Ok(())
@@ -106,9 +103,10 @@ impl Limits {
         history: &History,
         step: &Step,
         points: &[[Point; 8]],
+        equations: &mut Equations,
         job: &Job,
     ) -> Result<(), Failure> {
-        let Some(now) = structure.nearness_to_buckling(history, points, job)? else {
+        let Some(now) = structure.nearness_to_buckling(history, points, equations, job)? else {
             return Ok(());
         };
         if self.nearest.is_none_or(|nearest| now > nearest.load_over_critical) {

@@ -12,8 +12,8 @@ use crate::{
     limits::longest,
     member::{Along, Prepared, Raised, Reach},
     model::{
-        Action, Control, Drive, Failure, History, March, MarchSettings, Point, SteelKind, Step,
-        System, past_peak,
+        Action, Control, Drive, Equations, Failure, History, March, MarchSettings, Point,
+        SteelKind, Step, System, past_peak,
     },
 };
 
@@ -614,7 +614,9 @@ impl<'a, 'm> Watch<'a, 'm> {
         if let Some(history) = &self.history_at_peak
             && has_failed
         {
-            let near = self.structure.nearness_to_buckling(history, &self.at_peak, job)?;
+            let equations = &mut Equations::new(self.structure, &MarchSettings::of_deck());
+            let near =
+                self.structure.nearness_to_buckling(history, &self.at_peak, equations, job)?;
             if let Some(share) = near.filter(|share| *share > BUCKLES) {
                 return Ok((
                     Mode::Buckling,

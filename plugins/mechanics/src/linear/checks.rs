@@ -545,6 +545,22 @@ fn beams_that_meet_at_an_angle_turn_there_as_one() {
     near(far[4].distance(there), 0.0, 2e-5);
 }
 
+/// A shell does not resist what turns it about its normal, and has a middle that is somewhere.
+#[test]
+fn what_a_shell_cannot_bear_is_refused_by_node() {
+    let deck = "*NODE\n11,0,0,0\n12,1,0,0\n13,1,1,0\n14,0,1,0\n*ELEMENT,TYPE=S4,ELSET=E\n1,11,12,13,14\n\
+                *MATERIAL,NAME=M\n*ELASTIC\n200.,.3\n*SHELL SECTION,ELSET=E,MATERIAL=M\n.2\n\
+                *BOUNDARY\n11,1,6\n14,1,6\n*STEP\n*STATIC\n*CLOAD\n12,6,1.\n*END STEP\n";
+    let read = |deck: &str| parse(deck.as_bytes(), Path::new("deck.inp"), Units::MetreNewton);
+    let why = read(deck).unwrap().solve(&Job::default()).unwrap_err().to_string();
+    assert!(why.contains("node 12 "), "{why}");
+    for word in ["nan", "inf", "x"] {
+        let why = read(&deck.replace("MATERIAL=M\n.2", &format!("MATERIAL=M,OFFSET={word}\n.2")));
+        let why = why.unwrap_err().to_string();
+        assert!(why.contains("OFFSET is a number"), "{why}");
+    }
+}
+
 /// A plate on two hinges under its pressure, to where CalculiX 2.20 has it.
 #[test]
 fn hinges_of_shells_hold_their_middle() {

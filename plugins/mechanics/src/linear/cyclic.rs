@@ -46,6 +46,9 @@ const ON_AXIS: f64 = 1e-6;
 const ASKEW: f64 = 0.01;
 /// How far nodes may be from those that they move with, over the mean distance of neighbours.
 const NEAR: f64 = 0.005;
+/// What an arc counts beside a distance in the half plane: little, so that it decides between
+/// masters at one place there alone.
+const ASIDE: f64 = 0.1;
 
 /// The axis of a sector.
 #[derive(Clone, Copy)]
@@ -121,7 +124,7 @@ impl Reader {
         let sides = sides.cloned().ok_or_else(none)?;
         let row = Row { line: card.line, text: "" };
         let (slaves, masters) = (self.on(&sides.slave, row)?, self.on(&sides.master, row)?);
-        let pairs = self.paired(&slaves, &masters, axis);
+        let pairs = self.paired(&slaves, &masters, axis, phase);
         let angle = self.between(&pairs, axis);
         let is_askew = (angle.abs() - phase).abs() > ASKEW * phase;
         if is_askew && card.word("CHECK").as_deref() != Some("NO") {
@@ -187,16 +190,27 @@ impl Reader {
                 let why = "sides of a sector that run through beams or shells are not computed";
                 Err(row.fault(format!("node {label}: {why}")))
             }
+            None if nodes.is_empty() => {
+                Err(row.fault(format!("surface {} has no nodes", quote(name))))
+            }
             None => Ok(nodes.into_iter().collect()),
         }
     }
 
-    /// The master nearest to every slave, both turned into one half plane.
-    fn paired(&self, slaves: &[u32], masters: &[u32], axis: Axis) -> Vec<(u32, u32)> {
-        let apart = |a: u32, b: u32| axis.apart(self.place(a), self.place(b));
+    /// The master of every slave: itself where it is on both sides, else that nearest to it, both
+    /// turned into one half plane. Of several at one place there, which sides with a step around
+    /// the axis have, it is the one that is a sector away. Masters ascend.
+    fn paired(&self, slaves: &[u32], masters: &[u32], axis: Axis, phase: f64) -> Vec<(u32, u32)> {
+        let off = |slave: u32, master: u32| {
+            let (slave, master) = (self.place(slave), self.place(master));
+            let askew = (axis.angle(slave, master).abs() - phase).abs();
+            axis.apart(slave, master) + ASIDE * axis.arm(slave).length() * askew
+        };
         let nearest = |&slave: &u32| {
-            let order = |a: &&u32, b: &&u32| apart(slave, **a).total_cmp(&apart(slave, **b));
-            masters.iter().min_by(order).map(|&master| (slave, master))
+            let own = masters.binary_search(&slave).map(|_| slave).ok();
+            let order = |a: &u32, b: &u32| off(slave, *a).total_cmp(&off(slave, *b));
+            let master = own.or_else(|| masters.iter().copied().min_by(order))?;
+            Some((slave, master))
         };
         slaves.iter().filter_map(nearest).collect()
     }
@@ -311,7 +325,11 @@ impl Deck {
 
 #[cfg(test)]
 mod tests {
-    use std::{f64::consts::FRAC_PI_3, fmt::Write as _, path::Path};
+    use std::{
+        f64::consts::{FRAC_PI_3, FRAC_PI_6},
+        fmt::Write as _,
+        path::Path,
+    };
 
     use intrados_stage::Job;
 
@@ -327,11 +345,11 @@ mod tests {
         deck.solve(&Job::default()).unwrap()
     }
 
-    /// Nodes at so many stations, 60° apart, of these radii and heights.
-    fn stations(count: usize, places: &[[f64; 2]]) -> String {
+    /// Nodes at so many stations, so far apart, of these radii and heights.
+    fn stations(count: usize, angle: f64, places: &[[f64; 2]]) -> String {
         let mut text = String::from("*NODE\n");
         for k in 0..count {
-            let (sin, cos) = (k as f64 * FRAC_PI_3).sin_cos();
+            let (sin, cos) = (k as f64 * angle).sin_cos();
             for (j, [r, z]) in places.iter().enumerate() {
                 let number = places.len() * k + j + 1;
                 writeln!(text, "{number},{:?},{:?},{z:?}", r * cos, r * sin).unwrap();
@@ -343,7 +361,8 @@ mod tests {
     /// A ring of bricks that is held inside, or one of its six sectors.
     fn ring(is_whole: bool) -> String {
         let (count, parts) = if is_whole { (6, 6) } else { (2, 1) };
-        let mut text = stations(count, &[[1.0, 0.0], [2.0, 0.0], [2.2, 1.0], [1.0, 1.0]]);
+        let mut text =
+            stations(count, FRAC_PI_3, &[[1.0, 0.0], [2.0, 0.0], [2.2, 1.0], [1.0, 1.0]]);
         text += "*ELEMENT,TYPE=C3D8,ELSET=E\n";
         for k in 0..parts {
             let number = |k: usize, j: usize| 4 * (k % count) + j + 1;
@@ -364,7 +383,7 @@ mod tests {
     /// Six wedges around an axis, held below, or one of them.
     fn disc(is_whole: bool) -> String {
         let (count, parts) = if is_whole { (6, 6) } else { (2, 1) };
-        let mut text = stations(count, &[[2.0, 0.0], [2.2, 1.0]]);
+        let mut text = stations(count, FRAC_PI_3, &[[2.0, 0.0], [2.2, 1.0]]);
         text += "101,0.,0.,0.\n102,0.,0.,1.\n*ELEMENT,TYPE=C3D6,ELSET=E\n";
         for k in 0..parts {
             let number = |k: usize, j: usize| 2 * (k % count) + j + 1;
@@ -379,6 +398,58 @@ mod tests {
         text += "*BOUNDARY\n101,1,3\n";
         (0..count).for_each(|k| writeln!(text, "{},1,3", 2 * k + 1).unwrap());
         text
+    }
+
+    /// A ring of two layers that is held inside, or one of its six sectors, of which the outer layer
+    /// lies half a sector ahead of the inner one: its sides have a step around the axis.
+    fn stepped(is_whole: bool) -> String {
+        let count = if is_whole { 12 } else { 4 };
+        let places = [[1.0, 0.0], [2.0, 0.0], [3.0, 0.0], [1.0, 1.0], [2.0, 1.0], [3.0, 1.0]];
+        let mut text = stations(count, FRAC_PI_6, &places);
+        text += "*ELEMENT,TYPE=C3D8,ELSET=E\n";
+        let parts = if is_whole { 12 } else { 2 };
+        let layers = [(0, [0, 1, 4, 3]), (if is_whole { 0 } else { 1 }, [1, 2, 5, 4])];
+        let bricks = layers
+            .into_iter()
+            .flat_map(|(begin, section)| (begin..begin + parts).map(move |k| (k, section)));
+        for (number, (k, section)) in bricks.enumerate() {
+            let node = |k: usize, j: usize| (6 * (k % count) + j + 1).to_string();
+            let nodes = [k + 1, k].into_iter().flat_map(|k| section.map(|j| node(k, j)));
+            writeln!(text, "{},{}", number + 1, Vec::from_iter(nodes).join(",")).unwrap();
+        }
+        text += MATTER;
+        if !is_whole {
+            text += "*NSET,NSET=LOW\n1,2,4,5,8,9,11,12\n*NSET,NSET=HIGH\n13,14,16,17,20,21,23,24\n";
+            text += SIDES;
+        }
+        text += "*BOUNDARY\n";
+        let held = if is_whole { 12 } else { 3 };
+        (0..held).for_each(|k| writeln!(text, "{},1,3\n{},1,3", 6 * k + 1, 6 * k + 4).unwrap());
+        text
+    }
+
+    #[test]
+    fn sides_with_a_step_are_paired_a_sector_apart() {
+        let load = |inner: std::ops::Range<usize>, outer: std::ops::Range<usize>| {
+            let faces: String = inner.chain(outer).map(|e| format!("{e},P4,3.\n")).collect();
+            format!("*STEP\n*STATIC\n*DLOAD\n{faces}*END STEP\n")
+        };
+        let whole = solve(&(stepped(true) + &load(1..13, 13..25)));
+        let sector = solve(&(stepped(false) + &load(1..3, 3..5)));
+        let used = (0..24).filter(|n| ![2, 5, 18, 21].contains(n));
+        for n in used {
+            let [a, b] = [&sector, &whole].map(|solved| solved[0].displacements[n]);
+            assert!(a.distance(b) < 1e-11, "node {}: {a} is not {b}", n + 1);
+        }
+        assert!(whole[0].displacements[2].length() > 1e-3);
+    }
+
+    #[test]
+    fn sides_without_nodes_are_refused() {
+        let deck = ring(false).replace("LOW\n1,2,3,4\n", "LOW\n901,902\n");
+        let deck = deck.replace("N=6", "N=6,CHECK=NO") + "*STEP\n*STATIC\n*END STEP\n";
+        let why = parse(deck.as_bytes(), Path::new("deck.inp"), Units::MetreNewton).unwrap_err();
+        assert!(why.to_string().contains("has no nodes"), "{why}");
     }
 
     /// Those of 0 and 3 diameters are once in the whole; others twice, as they go around.

@@ -298,7 +298,8 @@ impl Reader {
             Some("SPOS") => -0.5,
             Some("SNEG") => 0.5,
             Some(word) => {
-                word.parse().map_err(|_| card.fault("OFFSET is a number, SPOS or SNEG"))?
+                let found = word.parse().ok().filter(|o: &f64| o.is_finite());
+                found.ok_or_else(|| card.fault("OFFSET is a number, SPOS or SNEG"))?
             }
         };
         let mut layers = Vec::new();

@@ -55,7 +55,7 @@ pub enum LinearError {
     #[error("element {0} is flat, folded, or its nodes are in the wrong order")]
     Folded(u32),
     /// A force where nothing resists.
-    #[error("{step}: a force acts on node {node}, which belongs to no element")]
+    #[error("{step}: a force or a moment acts on node {node} in a way that no element resists")]
     Idle {
         /// Name of the step.
         step: String,
@@ -585,6 +585,8 @@ impl<'a> System<'a> {
                 Some(number) => rhs[number] += factor * force,
                 None if force == 0.0 => {}
                 None => {
+                    // Angles are components of hidden nodes, at the place of their own.
+                    let node = self.deck.twins.get(&node).copied().unwrap_or(node);
                     let node = self.deck.labels.get(node as usize).copied().unwrap_or(0);
                     return Err(LinearError::Idle { step: self.step.name.clone(), node });
                 }

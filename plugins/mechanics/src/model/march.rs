@@ -1,6 +1,8 @@
 //! From one equilibrium to the next: Newton's iteration, smaller steps where it does not converge,
 //! and control of a displacement instead of a load where the structure softens (de Borst 1987).
 
+use std::collections::BTreeSet;
+
 use intrados_stage::{Cancelled, Job, time::DAY};
 
 use super::{Action, History, System, Trial, anderson::Anderson, nonlocal::Nonlocal};
@@ -245,11 +247,15 @@ struct Way<'s, 'm> {
 }
 
 /// Stiffness, and what solves with it.
-struct Equations {
-    matrix: BlockMatrix<3>,
-    solver: Option<Solver<3>>,
+pub(crate) struct Equations {
+    pub(super) matrix: BlockMatrix<3>,
+    pub(super) solver: Option<Solver<3>>,
+    /// Whether the matrix is still the one that the solver was made for.
+    pub(super) stays: bool,
     method: Method,
     tolerance: f64,
+    /// What has solved, by name.
+    by: BTreeSet<&'static str>,
 }
 
 /// A state and how it was found, or what keeps it from being one.
@@ -327,19 +333,13 @@ impl<'s, 'm> March<'s, 'm> {
         drive: Drive,
         settings: MarchSettings,
     ) -> Self {
-        let system = Equations {
-            matrix: structure.matrix(),
-            solver: None,
-            method: settings.method,
-            tolerance: settings.linear,
-        };
         Self {
             history,
             way: Way {
                 structure,
                 settings,
                 drive,
-                system,
+                system: Equations::new(structure, &settings),
                 nonlocal: Nonlocal::new(structure),
                 spent: 0.0,
                 ahead: Vec::new(),
@@ -352,6 +352,12 @@ impl<'s, 'm> March<'s, 'm> {
     #[must_use]
     pub(crate) fn fell_back(&self) -> bool {
         self.way.system.solver.as_ref().is_some_and(Solver::fell_back)
+    }
+
+    /// What has solved linear systems so far, by name.
+    #[must_use]
+    pub(crate) fn solved_by(&self) -> String {
+        Vec::from_iter(self.way.system.by.iter().copied()).join(", ")
     }
 
     /// Work so far, as [`MarchSettings::work`] counts it.
@@ -377,6 +383,20 @@ impl<'s, 'm> March<'s, 'm> {
         job: &Job,
         mut each: impl FnMut(&History, &Step) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
+        self.advance_with(to, amount, job, |history, step, _| each(history, step))
+    }
+
+    /// The same; `each` may also use the equations, which the next step assembles anew.
+    ///
+    /// # Errors
+    /// As [`March::advance`].
+    pub(crate) fn advance_with(
+        &mut self,
+        to: f64,
+        amount: f64,
+        job: &Job,
+        mut each: impl FnMut(&History, &Step, &mut Equations) -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
         let Self { history, way } = self;
         let (begin, mut done, mut part) = (history.time, 0.0_f64, 1.0_f64);
         while done < 1.0 {
@@ -395,7 +415,7 @@ impl<'s, 'm> March<'s, 'm> {
                 Ok((found, step)) => {
                     way.look_ahead(history, &found);
                     *history = found;
-                    each(history, &step)?;
+                    each(history, &step, &mut way.system)?;
                     done = next;
                     // Easy steps may grow again.
                     part = if step.avalanche > 0 || step.iterations <= way.settings.iterations / 3 {
@@ -495,6 +515,7 @@ impl Way<'_, '_> {
     fn attempt(&mut self, history: &History, goal: &Goal, job: &Job) -> Attempt {
         let &Goal { time, growth, patience, .. } = goal;
         let Self { structure, settings, drive, system, nonlocal, spent, ahead } = self;
+        system.stays = structure.keeps_stiffness() && !history.turned;
         let warmth = structure.warmth([history.time, time]);
         let (trial, mut field) = (
             Trial { time, warmth: &warmth, growth, hold: HOLD, ..Trial::still(history, &warmth) },
@@ -703,6 +724,18 @@ impl Aim {
 }
 
 impl Equations {
+    /// Nothing is assembled yet.
+    pub(crate) fn new(structure: &System, settings: &MarchSettings) -> Self {
+        Self {
+            matrix: structure.matrix(),
+            solver: None,
+            stays: false,
+            method: settings.method,
+            tolerance: settings.linear,
+            by: BTreeSet::new(),
+        }
+    }
+
     /// One correction K δx = out, and of the factor that is found so much that the controlled sum
     /// reaches its goal (last entry, in units). Iterations of the linear solver.
     fn correct(
@@ -718,11 +751,13 @@ impl Equations {
         let constraints =
             aim.constraints(nodes, |i, value, by_factor| value + factor * by_factor - x[i])?;
         match &mut self.solver {
+            Some(_) if self.stays => {}
             Some(solver) => solver.update(&self.matrix, &constraints, job)?,
             None => self.solver = Some(Solver::new(&self.matrix, &constraints, self.method, job)?),
         }
         let Some(solver) = &mut self.solver else { return Ok((vec![0.0; x.len() + 1], 0)) };
         let change = solver.solve(&self.matrix, out, &constraints, self.tolerance, job)?;
+        self.by.insert(change.method);
         let (mut step, mut linear) = (change.x, change.iterations);
         if aim.reference.is_empty() {
             step.push(0.0);

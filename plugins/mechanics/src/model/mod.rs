@@ -26,6 +26,7 @@ pub use ground::{Bedding, Ground};
 pub use history::History;
 pub use law::{Elastic, Matter, Memory, Record};
 pub use linear::Linear;
+pub(crate) use march::Equations;
 pub use march::{Control, Drive, Failure, March, MarchSettings, Step};
 pub use nonlocal::Regularisation;
 pub(crate) use steel::JACKING;
@@ -81,6 +82,13 @@ impl Model {
                 mix.1.cracks = cracks;
             }
         }
+    }
+
+    /// Whether all of it is elastic: what it answers is in proportion to what acts.
+    #[must_use]
+    pub(crate) fn is_elastic(&self) -> bool {
+        let is_elastic = |b: &Body| matches!(b.matter, Matter::Elastic(_) | Matter::Shell { .. });
+        self.bodies.iter().all(is_elastic) && self.steel.is_empty()
     }
 
     /// What a crack leaves in its concrete and what gives it its width, in words; none without

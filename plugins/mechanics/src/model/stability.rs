@@ -17,10 +17,10 @@ use glam::{DMat3, DVec3};
 use intrados_stage::{Job, random::Key};
 use nalgebra::DMatrix;
 
-use super::{Failure, History, Point, System, Trial};
+use super::{Bedding, Equations, Failure, Ground, History, Point, System, Trial};
 use crate::{
     element::hex8,
-    sparse::{Constraints, Method, Solver},
+    sparse::{BlockMatrix, Constraints, Method, Solver},
     tensor::Voigt,
 };
 
@@ -36,8 +36,19 @@ const LINEAR: f64 = 1e-6;
 type Geometric = [[f64; 8]; 8];
 
 impl System<'_> {
+    /// Whether its stiffness is at any time and wherever it moves that of rest, to the bit: elastic
+    /// bricks and shells that have always been there, on nothing that lets go.
+    pub(super) fn keeps_stiffness(&self) -> bool {
+        let holds = |g: &Ground| matches!(g.bedding, Bedding::Springs { lifts: false, .. });
+        self.model.is_elastic()
+            && self.model.bodies.iter().all(|body| body.birth == f64::NEG_INFINITY)
+            && self.model.ground.iter().all(holds)
+    }
+
     /// μ: the loads of a state over those under which the elastic structure buckles, 0 where
-    /// nothing does. `points` are those of [`System::all_points`].
+    /// nothing does. `points` are those of [`System::all_points`]. The `equations` of the march
+    /// there are solved with as they are where the structure keeps its stiffness; else their matrix
+    /// is written over.
     ///
     /// The largest eigenvalue by Lanczos's method in the product of K, every direction held against
     /// all before. None: nothing here is made of bricks, or the stiffness has no inverse.
@@ -48,20 +59,29 @@ impl System<'_> {
         &self,
         history: &History,
         points: &[[Point; 8]],
+        equations: &mut Equations,
         job: &Job,
     ) -> Result<Option<f64>, Failure> {
-        let (rest, warmth) = (self.rest(history.time), [Vec::new(), Vec::new()]);
-        let (mut matrix, mut force) = (self.matrix(), Vec::new());
-        self.assemble(Trial::still(&rest, &warmth), &rest.x, &mut matrix, &mut force, job)?;
         let mut constraints = Constraints::new(self.unknowns() / 3);
         let held = self.prescribed(history.time);
         for &(node, component, _) in &held {
             constraints.fix(node as usize, usize::from(component), 0.0)?;
         }
         let quiet = job.part(0.0, 0.0);
-        // Five to two dozen solutions of one matrix: what a factor costs pays sooner than for one.
-        let Ok(mut solver) = Solver::new(&matrix, &constraints, Method::Once, &quiet) else {
-            return Ok(None);
+        let Equations { matrix, solver, stays, .. } = equations;
+        let mut own = None;
+        let solver = match solver {
+            Some(solver) if *stays => solver,
+            other => {
+                // One matrix and, where it is a factor, one solver at a time.
+                other.iter_mut().for_each(Solver::release);
+                self.assemble_sound(history.time, matrix, job)?;
+                // Five to two dozen solutions of one matrix: a factor pays sooner than for one.
+                let Ok(made) = Solver::new(matrix, &constraints, Method::Once, &quiet) else {
+                    return Ok(None);
+                };
+                own.insert(made)
+            }
         };
         let geometric = self.geometric(history, points);
         let free = |mut v: Vec<f64>| {
@@ -80,7 +100,7 @@ impl System<'_> {
         let (mut basis, mut mu): (Vec<[Vec<f64>; 2]>, f64) = (Vec::new(), 0.0);
         let mut small = DMatrix::zeros(DIRECTIONS, DIRECTIONS);
         for k in 0..DIRECTIONS {
-            let Ok(found) = solver.solve(&matrix, &load, &constraints, LINEAR, &quiet) else {
+            let Ok(found) = solver.solve(matrix, &load, &constraints, LINEAR, &quiet) else {
                 return Ok(None);
             };
             let (mut v, mut kv) = (found.x, load);
@@ -108,6 +128,17 @@ impl System<'_> {
             }
         }
         Ok((!basis.is_empty()).then_some(mu))
+    }
+
+    /// The stiffness of what is there at a time, without cracks and with all joints closed.
+    fn assemble_sound(
+        &self,
+        time: f64,
+        matrix: &mut BlockMatrix<3>,
+        job: &Job,
+    ) -> Result<(), Failure> {
+        let (rest, warmth) = (self.rest(time), [Vec::new(), Vec::new()]);
+        self.assemble(Trial::still(&rest, &warmth), &rest.x, matrix, &mut Vec::new(), job)
     }
 
     /// G of every brick, its bars and tendons included.
@@ -182,13 +213,12 @@ mod tests {
 
     use super::*;
     use crate::{
-        mesh::{block, divide},
-        model::{Action, Body, Drive, Elastic, Load, March, MarchSettings, Matter, Model},
+        mesh::{HexFace, block, divide},
+        model::{Action, Body, Drive, Elastic, Load, March, MarchSettings, Matter, Model, Step},
     };
 
-    /// A clamped bar of 6 × .4 × .3 m under `thrust` N along its axis: loads over those of
-    /// buckling.
-    fn pressed(thrust: f64) -> f64 {
+    /// A clamped bar of 6 × .4 × .3 m under `thrust` N along its axis, without steel and ground.
+    fn bar(thrust: f64) -> Model {
         let mesh = block(
             &divide(0.0, 6.0, &[], 0.2),
             &divide(0.0, 0.4, &[], 0.2),
@@ -215,12 +245,26 @@ mod tests {
             action: Action::Nodes(push),
             history: vec![],
         });
-        let structure = System::new(&model).unwrap();
-        let mut march =
-            March::new(&structure, structure.rest(0.0), Drive::Loads, MarchSettings::default());
-        march.advance(1.0, 0.0, &Job::default(), |_, _| Ok(())).unwrap();
-        let points = structure.all_points(&march.history).unwrap();
-        structure.nearness_to_buckling(&march.history, &points, &Job::default()).unwrap().unwrap()
+        model
+    }
+
+    /// Loads over those of buckling, with the equations of the march and with new ones.
+    fn nearness(model: &Model) -> [f64; 2] {
+        let (structure, job) = (System::new(model).unwrap(), Job::default());
+        let settings = MarchSettings::default();
+        let mut march = March::new(&structure, structure.rest(0.0), Drive::Loads, settings);
+        let mut found = [f64::NAN; 2];
+        let each = |history: &History, _: &Step, kept: &mut Equations| -> Result<(), Failure> {
+            let points = structure.all_points(history)?;
+            let mut new = Equations::new(&structure, &settings);
+            for (found, equations) in found.iter_mut().zip([kept, &mut new]) {
+                let near = structure.nearness_to_buckling(history, &points, equations, &job)?;
+                *found = near.unwrap();
+            }
+            Ok(())
+        };
+        march.advance_with(1.0, 0.0, &job, each).unwrap();
+        found
     }
 
     /// π² E I/(4 l²) about the weaker axis; bricks with modes bend within a per cent, shear takes
@@ -228,8 +272,29 @@ mod tests {
     #[test]
     fn a_clamped_bar_buckles_under_eulers_load() {
         let euler = PI.powi(2) * 30e9 * (0.4 * 0.3_f64.powi(3) / 12.0) / (4.0 * 36.0);
-        let found = pressed(0.5 * euler);
-        assert!((found - 0.5).abs() < 0.01, "{found}");
-        assert!(pressed(-0.5 * euler) < 0.05, "{}", pressed(-0.5 * euler));
+        let [pressed, pulled] = [0.5, -0.5].map(|share| nearness(&bar(share * euler))[0]);
+        assert!((pressed - 0.5).abs() < 0.01, "{pressed}");
+        assert!(pulled < 0.05, "{pulled}");
+    }
+
+    /// What the march solved with is used where its stiffness stays, and gives the same bits; on
+    /// springs that let go, or where something is born, the sound structure has its own, whether a
+    /// factor or a hierarchy lay there before.
+    #[test]
+    fn the_equations_of_a_march_serve_where_its_stiffness_stays() {
+        let keeps = |model: &Model| System::new(model).unwrap().keeps_stiffness();
+        let [mut springs, mut born] = [bar(1e6), bar(1e6)];
+        let stiffness = DVec3::splat(1e9);
+        for (lifts, expected) in [(false, true), (true, false)] {
+            let bedding = Bedding::Springs { stiffness, lifts };
+            springs.ground = vec![Ground { face: HexFace { hex: 0, face: 0 }, bedding }];
+            assert_eq!(keeps(&springs), expected);
+        }
+        born.bodies[0].birth = 0.0;
+        assert!(keeps(&bar(1e6)) && !keeps(&born));
+        for model in [bar(1e6), springs, born] {
+            let [kept, new] = nearness(&model);
+            assert!(kept == new && kept > 0.0, "{kept} {new}");
+        }
     }
 }

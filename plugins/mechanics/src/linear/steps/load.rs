@@ -1,0 +1,355 @@
+//! Supports and loads, temperatures and initial stress.
+
+use std::collections::BTreeSet;
+
+use glam::DVec3;
+
+use super::{Given, Open, State, clear};
+use crate::{
+    linear::{
+        flat::{Plane, SLICE},
+        law::ORDER,
+        mesh::name_of,
+        model::{Procedure, Pull},
+        read::{Kind, Raw, Reader, Surface},
+        thin::Thin,
+        warm::is_temperature,
+    },
+    read::{
+        Fault,
+        abaqus::card::{Card, Row},
+        quote,
+    },
+    tensor::{self, Voigt},
+};
+
+impl Reader {
+    pub(super) fn boundary(&mut self, card: &Card<'_>, state: &mut State) -> Result<(), Fault> {
+        card.only(&["OP", "AMPLITUDE", "FIXED"])?;
+        clear(card, state.step, &mut state.held, |_| true)?;
+        clear(card, state.step, &mut state.kept, |_| true)?;
+        clear(card, state.step, &mut state.temperatures, |_| true)?;
+        let amplitude = name_of(card, "AMPLITUDE")?;
+        let step = state.step;
+        let keeps = card.get("FIXED").is_some();
+        if keeps && step < 2 {
+            return Err(card.fault("*BOUNDARY, FIXED holds what a step before has moved"));
+        }
+        for row in card.rows() {
+            let words: Vec<&str> = row.fields().collect();
+            let [target, first, rest @ ..] = words.as_slice() else {
+                return Err(row.fault("needed are: node or set, first and last component, value"));
+            };
+            let last = rest.first().filter(|w| !w.is_empty()).unwrap_or(first);
+            let value = rest.get(1).map_or(Ok(0.0), |w| row.number(w))?;
+            if is_temperature(first) {
+                for node in self.some_nodes(target, row)? {
+                    let given = Given { value, amplitude: amplitude.clone(), step };
+                    state.temperatures.insert(node, given);
+                }
+                continue;
+            }
+            let (first, last) = (component(first, row)?, component(last, row)?);
+            for node in self.some_nodes(target, row)? {
+                for component in first..=last {
+                    let (at, unit) = self.motion(node, component, Some(state.step), row)?;
+                    if component < 3 {
+                        self.supported((node, component), state.step, row.line);
+                    }
+                    let given = Given { value: value * unit, amplitude: amplitude.clone(), step };
+                    if keeps {
+                        state.held.remove(&at);
+                        state.kept.insert(at, given);
+                    } else {
+                        state.held.insert(at, given);
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The node and component that a component from 0 to 5 of a node is, and the unit of its value:
+    /// metres, or one for angles, which a support (of that step) holds otherwise than a moment.
+    pub(super) fn motion(
+        &mut self,
+        node: u32,
+        component: u8,
+        supported: Option<u32>,
+        row: Row<'_>,
+    ) -> Result<((u32, u8), f64), Fault> {
+        let Some(angle) = component.checked_sub(3) else {
+            return Ok(((node, component), self.units.length()));
+        };
+        let label = self.deck.labels[node as usize];
+        let known = self.turning.get(&node).copied();
+        let mean = self.angles(node, supported, row);
+        if let (None, Some(known), Some(&axes)) = (mean, known, self.deck.turned.get(&node)) {
+            // Angles of a body are a vector, which a *TRANSFORM turns like any other.
+            self.deck.turned.insert(known, axes);
+        }
+        let turning = mean.or(known);
+        let none = || {
+            row.fault(format!(
+                "node {label} has no component {}: solids have 1 to 3",
+                component + 1
+            ))
+        };
+        Ok(((turning.ok_or_else(none)?, angle), 1.0))
+    }
+
+    /// `*CHANGE SOLID SECTION`
+    pub(super) fn change(&mut self, card: &Card<'_>, state: &mut State) -> Result<(), Fault> {
+        card.only(&["ELSET", "MATERIAL"])?;
+        let material = card.need("MATERIAL")?;
+        let undefined = || card.fault(format!("material {} is not defined", quote(&material)));
+        let &material = self.materials.get(&material).ok_or_else(undefined)?;
+        for element in self.named_elements(card)? {
+            if let Some(cell) = self.raw[element as usize].cell {
+                state.materials.insert(cell, material);
+            }
+        }
+        Ok(())
+    }
+
+    /// Forces. What is given twice in a step adds up, as in CalculiX.
+    pub(super) fn cload(&mut self, card: &Card<'_>, state: &mut State) -> Result<(), Fault> {
+        card.only(&["OP", "AMPLITUDE", "TIME DELAY", "LOAD CASE"])?;
+        clear(card, state.step, &mut state.forces, |_| true)?;
+        clear(card, state.step, &mut state.early, |_| true)?;
+        let forces = match card.get("LOAD CASE") {
+            None | Some("1") => &mut state.forces,
+            Some("2") if harmonic(state.open.as_ref()) => &mut state.early,
+            Some(_) => {
+                return Err(card.fault("LOAD CASE is 1, or 2 in *STEADY STATE DYNAMICS"));
+            }
+        };
+        let amplitude = self.delayed(card)?;
+        let around = self.around_nodes();
+        for row in card.rows() {
+            let [target, direction, value] = row.exactly("node or set, component, force")?;
+            let (direction, value) = (component(direction, row)?, row.number(value)?);
+            for node in self.some_nodes(target, row)? {
+                // A force on what is axially symmetric is that on the whole circle.
+                let share = if around.contains(&node) { SLICE / 360.0 } else { 1.0 };
+                let (at, _) = self.motion(node, direction, None, row)?;
+                // A moment is of newtons and lengths.
+                let unit = if direction < 3 { 1.0 } else { self.units.length() };
+                let mut value = value * share * unit;
+                if let Some(old) = forces.get(&at)
+                    && old.step == state.step
+                {
+                    value += old.value;
+                }
+                let given = Given { value, amplitude: amplitude.clone(), step: state.step };
+                forces.insert(at, given);
+            }
+        }
+        Ok(())
+    }
+
+    /// The amplitude that a card names, which begins later where it says so.
+    fn delayed(&mut self, card: &Card<'_>) -> Result<Option<String>, Fault> {
+        let (Some(name), Some(delay)) = (name_of(card, "AMPLITUDE")?, card.get("TIME DELAY"))
+        else {
+            return name_of(card, "AMPLITUDE");
+        };
+        let wrong = || card.fault(format!("TIME DELAY={} is no time", quote(delay)));
+        let by: f64 = delay.parse().map_err(|_| wrong())?;
+        let mut later = self.amplitude_of(&name, card.line)?.clone();
+        later.points.iter_mut().for_each(|p| p.0 += by);
+        later.name = format!("{name} {by} s later");
+        let name = later.name.clone();
+        self.amplitudes.insert(name.clone(), later);
+        Ok(Some(name))
+    }
+
+    /// Nodes of planes where some are axially symmetric: all of them are in the slice then.
+    pub(in crate::linear) fn around_nodes(&self) -> BTreeSet<u32> {
+        let is_around = self.is_around();
+        let flat = |r: &&Raw| is_around && matches!(r.kind, Kind::Flat(_));
+        self.raw.iter().filter(flat).flat_map(|r| r.nodes.iter().copied()).collect()
+    }
+
+    /// Whether a slice stands for what is axially symmetric.
+    pub(in crate::linear) fn is_around(&self) -> bool {
+        let around = |kind| matches!(kind, Kind::Flat(flat) if flat.plane == Plane::Around);
+        self.raw.iter().any(|r| around(r.kind))
+    }
+
+    pub(super) fn dload(
+        &mut self,
+        card: &Card<'_>,
+        state: &mut State,
+        on_surface: bool,
+    ) -> Result<(), Fault> {
+        card.only(&["OP", "AMPLITUDE"])?;
+        clear(card, state.step, &mut state.pressures, |_| true)?;
+        if !on_surface {
+            clear(card, state.step, &mut state.pulls, |_| true)?;
+        }
+        let amplitude = name_of(card, "AMPLITUDE")?;
+        for row in card.rows() {
+            let words: Vec<&str> = row.fields().collect();
+            let [target, kind, value, rest @ ..] = words.as_slice() else {
+                return Err(row.fault("needed are: element or set, kind, value"));
+            };
+            let (kind, value) = (kind.to_ascii_uppercase(), row.number(value)?);
+            let step = state.step;
+            if matches!(kind.as_str(), "GRAV" | "CENTRIF") && !on_surface {
+                let elements = self.some_cells(target, row)?;
+                let pull = self.pull(&kind, value, rest, row)?;
+                let given = Given { value: (elements, pull), amplitude: amplitude.clone(), step };
+                state.pulls.insert((target.to_ascii_uppercase(), kind), given);
+                continue;
+            }
+            for face in self.loaded(target, &kind, on_surface, row)? {
+                let value = value * self.units.stress();
+                let given = Given { value, amplitude: amplitude.clone(), step };
+                state.pressures.insert(face, given);
+            }
+        }
+        Ok(())
+    }
+
+    /// Faces that a pressure acts on.
+    fn loaded(
+        &self,
+        target: &str,
+        kind: &str,
+        on_surface: bool,
+        row: Row<'_>,
+    ) -> Result<Vec<(u32, u8)>, Fault> {
+        let kinds = "P1 to P6, GRAV and CENTRIF, and P on a *DSLOAD";
+        let is_face = kind.len() == 2 && kind.starts_with('P');
+        match (on_surface, self.surfaces.get(&target.to_ascii_uppercase())) {
+            (true, Some(Surface::Faces(faces))) if kind == "P" => Ok(self.cell_faces(faces)),
+            (true, None) => Err(row.fault(format!("surface {} is not defined", quote(target)))),
+            (false, _) if kind == "P" => {
+                // A pressure on a shell pushes along its normal: it acts on the lower face.
+                let elements = self.some_elements(target, row)?;
+                let shell =
+                    |e: &u32| matches!(self.raw[*e as usize].kind, Kind::Thin(Thin::Shell { .. }));
+                if let Some(&other) = elements.iter().find(|e| !shell(e)) {
+                    let label = self.raw[other as usize].label;
+                    return Err(row.fault(format!("P is of shells, which element {label} is not")));
+                }
+                let faces: Vec<(u32, u8)> = elements.into_iter().map(|e| (e, 0)).collect();
+                Ok(self.cell_faces(&faces))
+            }
+            (false, _) if is_face => {
+                let elements = self.some_elements(target, row)?;
+                let face = |e| Ok((e, self.face(e, kind, "P", row)?));
+                let faces: Vec<(u32, u8)> =
+                    elements.into_iter().map(face).collect::<Result<_, _>>()?;
+                Ok(self.cell_faces(&faces))
+            }
+            _ => Err(row.fault(format!("load {} is not supported; {kinds} are", quote(kind)))),
+        }
+    }
+
+    /// Faces of solids that faces of elements are.
+    fn cell_faces(&self, faces: &[(u32, u8)]) -> Vec<(u32, u8)> {
+        faces.iter().filter_map(|&(e, face)| Some((self.raw[e as usize].cell?, face))).collect()
+    }
+
+    /// Weight: g and its direction. Spin: ω², a point of the axis and its direction.
+    fn pull(&self, kind: &str, value: f64, rest: &[&str], row: Row<'_>) -> Result<Pull, Fault> {
+        let numbers = rest.iter().map(|w| row.number(w)).collect::<Result<Vec<_>, _>>()?;
+        let length = self.units.length();
+        match (kind, numbers.as_slice()) {
+            ("GRAV", &[x, y, z]) => Ok(Pull::Weight(value * length * DVec3::new(x, y, z))),
+            ("CENTRIF", &[x, y, z, a, b, c]) => {
+                let axis = DVec3::new(a, b, c).try_normalize();
+                let axis = axis.ok_or_else(|| row.fault("the axis has no length"))?;
+                Ok(Pull::Spin { origin: length * DVec3::new(x, y, z), axis, squared: value })
+            }
+            _ => Err(row.fault(
+                "needed are: set, GRAV, g, and its direction; or set, CENTRIF, ω², a point of the axis and its direction",
+            )),
+        }
+    }
+
+    pub(super) fn temperature(&mut self, card: &Card<'_>, state: &mut State) -> Result<(), Fault> {
+        card.only(&["OP", "AMPLITUDE"])?;
+        clear(card, state.step, &mut state.warm, |_| true)?;
+        let amplitude = name_of(card, "AMPLITUDE")?;
+        for row in card.rows() {
+            let [target, value] = row.exactly("node or set, temperature")?;
+            let value = row.number(value)?;
+            for node in self.some_nodes(target, row)? {
+                let given = Given { value, amplitude: amplitude.clone(), step: state.step };
+                state.warm.insert(node, given);
+            }
+        }
+        Ok(())
+    }
+
+    pub(super) fn initial(&mut self, card: &Card<'_>) -> Result<(), Fault> {
+        card.only(&["TYPE"])?;
+        let kind = card.word("TYPE").unwrap_or_default();
+        match kind.as_str() {
+            "TEMPERATURE" => {
+                for row in card.rows() {
+                    let [target, value] = row.exactly("node or set, temperature")?;
+                    let value = row.number(value)?;
+                    for node in self.some_nodes(target, row)? {
+                        self.deck.cold[node as usize] = value;
+                    }
+                }
+                Ok(())
+            }
+            "STRESS" => {
+                self.at_points(card, |reader, _, v| tensor::scale(&v, reader.units.stress()))
+            }
+            "PLASTIC STRAIN" | "PLASTICSTRAIN" => self.at_points(card, |reader, e, mut v| {
+                (3..6).for_each(|i| v[i] *= 2.0);
+                let cell = &reader.deck.cells[e as usize];
+                let law = reader.deck.materials[cell.material as usize].elastic.as_ref();
+                let cold = cell.nodes.first().map_or(0.0, |&n| reader.deck.cold[n as usize]);
+                let law = law.map_or([[0.0; 6]; 6], |l| l.stiffness(cold));
+                tensor::scale(&tensor::apply(&law, &v), -1.0)
+            }),
+            _ => Err(card.fault(format!(
+                "TYPE={}: TEMPERATURE, STRESS and PLASTIC STRAIN are supported",
+                quote(&kind)
+            ))),
+        }
+    }
+
+    /// Element, point, and six numbers in Abaqus' order.
+    fn at_points(
+        &mut self,
+        card: &Card<'_>,
+        stress: impl Fn(&Self, u32, Voigt) -> Voigt,
+    ) -> Result<(), Fault> {
+        for row in card.rows() {
+            let what = "element, point, 11, 22, 33, 12, 13, 23";
+            let [element, point, numbers @ ..] = row.exactly::<8>(what)?;
+            let mut given = tensor::ZERO;
+            for (word, at) in numbers.iter().zip(ORDER) {
+                given[at] = row.number(word)?;
+            }
+            for element in self.some_cells(element, row)? {
+                let points = self.deck.cells[element as usize].shape.points().len();
+                let point = point.parse::<u32>().ok().filter(|p| (1..=points as u32).contains(p));
+                let point = point
+                    .ok_or_else(|| row.fault(format!("a point is a number from 1 to {points}")))?;
+                let stress = stress(self, element, given);
+                self.deck.stress.insert((element, point - 1), stress);
+            }
+        }
+        Ok(())
+    }
+}
+
+fn harmonic(open: Option<&Open>) -> bool {
+    matches!(open.and_then(|o| o.procedure), Some(Procedure::Harmonic { .. }))
+}
+
+pub(super) fn component(word: &str, row: Row<'_>) -> Result<u8, Fault> {
+    match word.parse::<u8>() {
+        Ok(c @ 1..=6) => Ok(c - 1),
+        _ => Err(row.fault(format!("{} is no component: 1 to 6 are", quote(word)))),
+    }
+}
