@@ -124,9 +124,6 @@ pub struct PipeOutcome {
     pub final_around_pa: f64,
     /// Mean along at the end, Pa.
     pub final_along_pa: f64,
-    /// The most that its soft layer pulls, Pa, where that is glued.
-    #[serde(default)]
-    pub pulled_pa: f64,
 }
 
 /// How well the cubes of an imported member agree with its surface.
@@ -476,7 +473,6 @@ impl PipeOutcome {
             sum = [sum[0] + around, sum[1] + along];
         }
         [self.final_around_pa, self.final_along_pa] = sum.map(|s| s / count.max(1) as f64);
-        self.pulled_pa = self.pulled_pa.max(structure.pulls(history)?);
         Ok(())
     }
 }

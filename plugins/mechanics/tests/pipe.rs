@@ -24,7 +24,7 @@ const CONCRETE: f64 = 30e9;
 /// What becomes of the pipe of a tunnel whose ends, and those of the pipe, stay where they are
 /// along it, under a load from day 10 to 11; its concrete is elastic. The start of the lining is held
 /// in all directions where the pipe hands nothing on to it.
-fn pipe(cushion_mpa: f64, glued: bool, action: &str, holds_end: bool) -> PipeOutcome {
+fn pipe(cushion_mpa: f64, action: &str, holds_end: bool) -> PipeOutcome {
     let hold = |place: &str| {
         format!("(member: \"T\", place: {place}, hold: Directions(x: false, y: false, z: true))")
     };
@@ -36,7 +36,7 @@ fn pipe(cushion_mpa: f64, glued: bool, action: &str, holds_end: bool) -> PipeOut
     }
     let text = format!(
         "(schema: \"intrados.scene/1\", members: [(id: \"T\", at: (0, 0, 0), concrete: \"C30/37\", body: Tunnel(radius_m: {INNER}, length_m: {LENGTH}, \
-         inner_lining: (thickness_m: {}), pipe: (thickness_mm: {}, cushion_mm: {}, cushion_mpa: {cushion_mpa}, glued: {glued}), \
+         inner_lining: (thickness_m: {}), pipe: (thickness_mm: {}, cushion_mm: {}, cushion_mpa: {cushion_mpa}), \
          ground: (model: Springs(radial_mpa_m: 0.001, tangential_mpa_m: 0.001))))], supports: [{}], \
          loads: [(name: \"it\", action: {action}, history: [(10, 0), (11, 1)])])",
         OUTER - INNER,
@@ -68,7 +68,7 @@ fn pipe_cushion_and_lining_share_the_inner_pressure() {
     let pressure = 1e6;
     let [radius, middle] = [INNER - CUSHION - 0.5 * WALL, INNER - 0.5 * CUSHION - 0.25 * WALL];
     for cushion_mpa in [5.0, 500.0] {
-        let found = pipe(cushion_mpa, false, "InnerPressure(pressure_kpa: 1000)", true);
+        let found = pipe(cushion_mpa, "InnerPressure(pressure_kpa: 1000)", true);
         // Displacement by traction between, the pressure q a on the lining being q_m r_m.
         let lame = (1.0 + 0.2) / CONCRETE * (0.6 * INNER * INNER + OUTER * OUTER)
             / (OUTER * OUTER - INNER * INNER);
@@ -97,23 +97,14 @@ fn pipe_cushion_and_lining_share_the_inner_pressure() {
 /// The cushion hands on next to nothing: E α ΔT, and E δ/L.
 #[test]
 fn a_pipe_that_is_held_is_stressed_by_heat_and_by_its_ends() {
-    let warm = pipe(0.1, false, "PipeTemperature(warmer_k: 20)", true);
+    let warm = pipe(0.1, "PipeTemperature(warmer_k: 20)", true);
     let by_hand = -STEEL * 1.2e-5 * 20.0;
     assert!((warm.final_along_pa / by_hand - 1.0).abs() < 0.01, "{warm:?} and not {by_hand}");
     assert!(warm.final_around_pa.abs() < 0.01 * by_hand.abs(), "{warm:?}");
     let pulled = "Displacement(place: Pipe(1), displacement_mm: (0, 0, 1))";
-    let pulled = pipe(0.1, false, pulled, false);
+    let pulled = pipe(0.1, pulled, false);
     let by_hand = STEEL * 1e-3 / LENGTH;
     assert!((pulled.final_along_pa / by_hand - 1.0).abs() < 0.01, "{pulled:?} and not {by_hand}");
-}
-
-/// Stiff beside its foam, it hangs as a whole: k u cos θ across it and .3 k u sin θ along it bear it
-/// all around, so that its crown pulls by 2/1.3 of what a square metre weighs.
-#[test]
-fn a_glued_pipe_hangs_in_its_foam() {
-    let hangs = pipe(0.1, true, "SelfWeight", false);
-    let by_hand = 2.0 / 1.3 * 7850.0 * 9.80665 * WALL;
-    assert!((hangs.pulled_pa / by_hand - 1.0).abs() < 0.03, "{hangs:?} and not {by_hand}");
 }
 
 /// The bundled tunnel with a pipe until its water is in: the wall bears what is left to it by a

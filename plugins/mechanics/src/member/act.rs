@@ -30,6 +30,8 @@ const LOOKS: f64 = 0.7;
 const FIRST: f64 = DAY;
 /// Cosine from which on a member lies along an axis of the world: single precision turns it less.
 const ALONG: f64 = 1.0 - 1e-8;
+/// Said of a ring that its ground only beds.
+const UNPRESSED: &str = "nothing presses the ring on its ground: as it shrinks it may part from it, and rest where no equilibrium is found; give cover_m and weight_kn_m3, or water_m";
 /// Said of what is computed up to a plane of symmetry.
 pub(crate) const UP_TO_SYMMETRY: &str = "what is symmetric is computed up to its plane of symmetry: weight, loads and forces are those of that part";
 
@@ -57,6 +59,9 @@ impl Draft<'_> {
         };
         match ground.model {
             GroundModel::Springs { radial_mpa_m, tangential_mpa_m } => {
+                if vertical * cover <= 0.0 && water <= 0.0 {
+                    self.notes.push(UNPRESSED.into());
+                }
                 let springs = |face: HexFace| {
                     let (at, _) = self.model.mesh.face_middle(face);
                     Winkler {

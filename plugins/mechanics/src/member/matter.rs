@@ -116,7 +116,7 @@ impl Draft<'_> {
                 normal,
                 shear: 0.3 * normal,
                 friction: CUSHION_FRICTION,
-                cohesion: if pipe.glued { f64::INFINITY } else { 0.0 },
+                cohesion: 0.0,
             }),
         };
         Body { matter, birth }

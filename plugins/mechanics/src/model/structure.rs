@@ -542,7 +542,7 @@ impl<'m> System<'m> {
         let mut slips = trial.history.slips.clone();
         for (e, slip) in slips.iter_mut().enumerate() {
             let mut after = *slip;
-            self.joint(e, trial, &x, |point, answer| after[point] = answer.slipped)?;
+            self.joint(e, trial, &x, |point, slipped| after[point] = slipped)?;
             *slip = after;
         }
         let bars = self.commit_bars(trial, &x)?;
@@ -613,31 +613,13 @@ impl<'m> System<'m> {
         self.model.steel.iter().enumerate().map(mean).collect()
     }
 
-    /// The largest tension across joints that are alive and glued, Pa.
-    ///
-    /// # Errors
-    /// [`Failure::Element`] if one is degenerate.
-    pub(crate) fn pulls(&self, history: &History) -> Result<f64, Failure> {
-        let (mut most, cold) = (0.0_f64, [Vec::new(), Vec::new()]);
-        let still = Trial::still(history, &cold);
-        for (joint, cell) in self.model.mesh.interfaces.iter().enumerate() {
-            let matter = &self.model.bodies[cell.region as usize].matter;
-            if matches!(matter, Matter::Joint(law) if law.cohesion == f64::INFINITY) {
-                self.joint(joint, still, &history.x, |_, answer| {
-                    most = most.max(answer.traction[0]);
-                })?;
-            }
-        }
-        Ok(most)
-    }
-
-    /// A joint at displacements `x`; `each` hears what its points answer.
+    /// A joint at displacements `x`; `each` hears the slip of its points.
     fn joint(
         &self,
         joint: usize,
         trial: Trial,
         x: &[f64],
-        mut each: impl FnMut(usize, &interface::Answer),
+        mut each: impl FnMut(usize, [f64; 2]),
     ) -> Result<crate::element::Element<24>, Failure> {
         let cell = &self.model.mesh.interfaces[joint];
         let body = &self.model.bodies[cell.region as usize];
@@ -655,7 +637,7 @@ impl<'m> System<'m> {
         let nodes = cell.nodes.map(|n| self.model.mesh.nodes[n as usize]);
         let law = |point: usize, jump: &[f64; 3]| {
             let answer = friction.respond(jump, &trial.history.slips[joint][point]);
-            each(point, &answer);
+            each(point, answer.slipped);
             // Symmetric: while it slides, what pressure does to friction is left to the iteration.
             let mut tangent = answer.tangent;
             (tangent[1][0], tangent[2][0]) = (0.0, 0.0);

@@ -182,11 +182,6 @@ fn stresses(ui: &mut Ui, own: &MemberOutcome) {
             let [around, along] = [pipe.around_pa, pipe.along_pa].map(|pa| fixed(mpa(pa), 0));
             copied(ui, RichText::new(tr!("{} MPa around, {} along", around, along)));
             ui.end_row();
-            if pipe.pulled_pa > 0.0 {
-                ui.label(tr!("its soft layer pulls"));
-                copied(ui, RichText::new(format!("{} kPa", fixed(1e-3 * pipe.pulled_pa, 0))));
-                ui.end_row();
-            }
         }
     });
 }

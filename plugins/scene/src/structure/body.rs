@@ -426,18 +426,13 @@ const MOST_RINGS: f32 = 20_000.0;
 pub struct Pipe {
     /// Of its wall, mm.
     pub thickness_mm: f32,
-    /// Soft layer between the pipe and the intrados, mm: no tension and little friction, unless it
-    /// is glued.
+    /// Soft layer between the pipe and the intrados, mm: no tension, little friction.
     #[serde(default)]
     pub cushion_mm: f32,
     /// Stress over strain of that layer across it, MPa; grouted or cast against the pipe, it does
     /// not matter.
     #[serde(default = "foam")]
     pub cushion_mpa: f32,
-    /// Whether that layer sticks to both, as sprayed or glued foam does: it pulls, too, however
-    /// much, and what it pulls at most is told. A thin pipe hangs by it until water presses it on.
-    #[serde(default)]
-    pub glued: bool,
     /// When it is fitted, days; none: when the last pour bears.
     #[serde(default)]
     pub at_days: Option<f32>,
