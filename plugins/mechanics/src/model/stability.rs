@@ -26,10 +26,13 @@ use crate::{
 
 /// Directions that are looked at, at most.
 const DIRECTIONS: usize = 24;
-/// The eigenvalue is known well enough when one more direction changes it by less than this share.
+/// The eigenvalue is known well enough when one more direction changes it by less than this share
+/// of it, or of a [`HUNDREDTH`], below which nobody asks how much it is.
 const SETTLED: f64 = 1e-3;
+/// Of the loads that buckle.
+const HUNDREDTH: f64 = 0.01;
 /// To which part linear systems are solved.
-const LINEAR: f64 = 1e-6;
+const LINEAR: f64 = 1e-4;
 
 /// G of one brick over one component of its nodes' displacements, N/m: all three components have
 /// the same.
@@ -123,7 +126,7 @@ impl System<'_> {
                 &mut mu,
                 small.view((0, 0), (k + 1, k + 1)).symmetric_eigenvalues().max().max(0.0),
             );
-            if k > 3 && mu - before <= SETTLED * mu {
+            if k > 3 && mu - before <= SETTLED * mu.max(HUNDREDTH) {
                 break;
             }
         }
