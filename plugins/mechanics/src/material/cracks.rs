@@ -230,14 +230,14 @@ struct Cracked {
 
 /// How far planes are broken, and how much of what is pulled across them is lost.
 #[derive(Debug, Clone, Copy)]
-struct Lost {
+struct PlaneDamage {
     damage: [f64; 3],
     across: [f64; 3],
 }
 
 /// Stress under `strain` (along the planes' axes) at what they have lost, if each unit of strain on
 /// the section brings `creep` more of it.
-fn solve(modulus: f64, nu: f64, strain: &Voigt, lost: &Lost, creep: f64) -> Cracked {
+fn solve(modulus: f64, nu: f64, strain: &Voigt, lost: &PlaneDamage, creep: f64) -> Cracked {
     let q = 1.0 + creep;
     let left = lost.across.map(|d| 1.0 - d);
     let broken = lost.damage.map(|b| b / (1.0 - b));
@@ -427,7 +427,7 @@ struct Point<'a> {
 
 /// What a point answers at given damage.
 struct Found {
-    lost: Lost,
+    lost: PlaneDamage,
     cracked: Cracked,
     /// Before crushing, in the world's axes, Pa.
     stress: Voigt,
@@ -595,7 +595,7 @@ impl Concrete {
         let (e, nu) = (self.elastic.modulus, self.elastic.poisson);
         let Point { clock, state, axes, .. } = point;
         let (before, laws) = (&state.planes, &point.laws);
-        let lost = Lost {
+        let lost = PlaneDamage {
             damage: std::array::from_fn(|i| before.damage[i].max(laws[i].damage(kappa[i]))),
             across: std::array::from_fn(|i| {
                 let across = |lasted| laws[i].across(kappa[i], lasted);
@@ -793,7 +793,8 @@ mod tests {
     fn without_damage_it_is_hooke() {
         for walk in 0..100 {
             let strain = random(walk, 1e-3);
-            let found = solve(E, NU, &strain, &Lost { damage: [0.0; 3], across: [0.0; 3] }, 0.0);
+            let found =
+                solve(E, NU, &strain, &PlaneDamage { damage: [0.0; 3], across: [0.0; 3] }, 0.0);
             assert!(
                 largest(&tensor::sub(
                     &found.stress,
@@ -809,7 +810,7 @@ mod tests {
     fn tangent_is_secant_and_that_of_finite_differences() {
         for walk in 0..100 {
             let (strain, creep) = (random(walk, 1e-3), if walk % 2 == 0 { 0.0 } else { 0.7 });
-            let lost = Lost { damage: [0.99, 0.5, 0.0], across: [0.9, 0.5, 0.0] };
+            let lost = PlaneDamage { damage: [0.99, 0.5, 0.0], across: [0.9, 0.5, 0.0] };
             let found = solve(E, NU, &strain, &lost, creep);
             assert!(
                 largest(&tensor::sub(&tensor::apply(&found.tangent, &strain), &found.stress))

@@ -166,17 +166,17 @@ impl Knee {
     /// d = 1 − (κ₀/κ) σ/f_t, where κ = κ₀ σ/f_t + w/h.
     #[must_use]
     pub(crate) fn damage(&self, kappa: f64) -> f64 {
-        self.lost(kappa, self.softened(kappa))
+        self.secant_damage(kappa, self.softened(kappa))
     }
 
     /// The same of what is pulled across the crack, which bars hold together; its faces, and so
     /// shear along them, know nothing of that.
     #[must_use]
     pub(crate) fn across(&self, kappa: f64, lasted: bool) -> f64 {
-        self.lost(kappa, self.softened(kappa).max(self.held.stress(kappa, lasted)))
+        self.secant_damage(kappa, self.softened(kappa).max(self.held.stress(kappa, lasted)))
     }
 
-    fn lost(&self, kappa: f64, stress: f64) -> f64 {
+    fn secant_damage(&self, kappa: f64, stress: f64) -> f64 {
         match kappa <= self.threshold {
             true => 0.0,
             false => (1.0 - self.threshold / kappa * stress).min(MAX_DAMAGE),
