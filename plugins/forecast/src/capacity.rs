@@ -26,7 +26,7 @@ use intrados_mechanics::{
 use intrados_scene::Scene;
 use intrados_stage::{Estimate, Job};
 use rayon::prelude::*;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::{
     ForecastError,
@@ -39,7 +39,7 @@ use crate::{
 pub const MODEL_ERROR: f64 = 0.1;
 
 /// What is known to be lost of a member, by zone.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Losses {
     /// Of its concrete, beyond what its life foretells.
     pub concrete: [Estimate; ZONES],
@@ -72,7 +72,7 @@ pub fn beyond(known: Estimate, foretold: f64) -> Estimate {
 }
 
 /// What a member bears.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Capacity {
     /// The loads that were raised.
     pub loads: Vec<String>,

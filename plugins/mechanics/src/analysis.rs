@@ -318,29 +318,29 @@ pub fn analyze_until_stopped(
         }
     }
     outcome.stability = limits.nearest;
-    if let Some(raised) = prepared.raised.as_ref().filter(|_| outcome.complaint.is_empty()) {
-        let start = march.history.clone();
-        let each = |history: &History, step: &Step, points: &[[Point; 8]]| {
-            observer.see(&structure, history, step, points)
-        };
-        let settings = strength::settings(settings);
-        let (found, end) =
-            strength::raise(&structure, prepared, raised, start, settings, job, each)?;
-        if found.stopped {
-            outcome.stop("while its loads were raised");
-        }
-        (outcome.strength, march.history) = (Some(found), end);
-    }
-    let (warnings, notes) = limits.told();
-    outcome.warnings.extend(warnings);
-    outcome.notes.extend(notes);
+    outcome.solver = march.solved_by();
     if march.fell_back() {
         outcome
             .warnings
             .push("multigrid did not converge: its systems were factorised instead".into());
     }
-    outcome.solver = march.solved_by();
-    let history = march.history;
+    // Its matrix and its factor go before others are made.
+    let mut history = march.into_history();
+    if let Some(raised) = prepared.raised.as_ref().filter(|_| outcome.complaint.is_empty()) {
+        let each = |history: &History, step: &Step, points: &[[Point; 8]]| {
+            observer.see(&structure, history, step, points)
+        };
+        let settings = strength::settings(settings);
+        let (found, end) =
+            strength::raise(&structure, prepared, raised, history, settings, job, each)?;
+        if found.stopped {
+            outcome.stop("while its loads were raised");
+        }
+        (outcome.strength, history) = (Some(found), end);
+    }
+    let (warnings, notes) = limits.told();
+    outcome.warnings.extend(warnings);
+    outcome.notes.extend(notes);
     steel.tell(prepared, &history, &mut outcome);
     let readings =
         structure.read(&prepared.gauges.iter().map(|g| g.1).collect::<Vec<_>>(), &history)?;

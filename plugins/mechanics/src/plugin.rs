@@ -9,7 +9,7 @@ use intrados_scene::{Member, Scene, SurfaceDamage, plugin::CurrentScene};
 use intrados_stage::{Job, Jobs, Stage, Task, Unfinished, Work, alone};
 
 use crate::{
-    analysis::{Outcome, analyze},
+    analysis::{Outcome, analyze_until_stopped},
     frame::joined,
     member::{Along, Meshing, prepare_within},
     model::MarchSettings,
@@ -34,7 +34,7 @@ pub struct Stop(pub String);
 /// What came of an analysis.
 #[derive(Debug)]
 pub struct Life {
-    /// Its results; they say whether it ended early.
+    /// Its results; they say whether it ended early or was stopped.
     pub outcome: Arc<Outcome>,
     /// What is to be seen of it from outside at each equilibrium, and when that is, s.
     damage: Vec<(f64, Vec<SurfaceDamage>)>,
@@ -143,7 +143,7 @@ fn life(scene: &Scene, wish: &Analyze, seen: Seen, job: &Job) -> Result<Life, Un
         return Err(Unfinished::Because(why.into()));
     }
     let mut looking = Looking::new(&prepared, seen);
-    match analyze(&prepared, MarchSettings::of_life(), job, &mut looking) {
+    match analyze_until_stopped(&prepared, MarchSettings::of_life(), job, &mut looking) {
         Ok((outcome, _)) => Ok(Life { outcome: Arc::new(outcome), damage: looking.damage }),
         Err(why) if why.is_cancelled() => Err(Unfinished::Cancelled),
         Err(other) => Err(because(&other)),

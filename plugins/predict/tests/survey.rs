@@ -5,9 +5,9 @@
 use std::fs;
 
 use intrados_damage::{Cause, Sources, grading::Profile};
-use intrados_predict::{PredictSettings, Prediction, predict};
+use intrados_predict::{PredictError, PredictSettings, Prediction, Predictor, predict};
 use intrados_scene::Scene;
-use intrados_stage::Job;
+use intrados_stage::{Job, file::Set};
 
 /// A column of .4 × .4 × 5 m with eight bars of 20 mm under 40 mm, thirty years old.
 fn predicted(exposure: &str, items: &str) -> Prediction {
@@ -82,10 +82,8 @@ fn a_reading_from_nowhere_is_not_used() {
     assert!(why.contains("add along") && prediction.members[0].damage.is_none(), "{why}");
 }
 
-/// By a profile that grades by strength a stub under a jack has the damage that its bad concrete
-/// costs, and the states of that; one that nothing presses has that of its worst zone, which is said.
-#[test]
-fn what_damage_costs_is_graded_or_it_is_said_that_it_is_not() {
+/// Two stubs of bad concrete, of which a jack presses A alone.
+fn stubs() -> Scene {
     let folder = tempfile::tempdir().unwrap();
     let stub = |id: &str, x: f64| {
         format!(
@@ -112,11 +110,21 @@ fn what_damage_costs_is_graded_or_it_is_said_that_it_is_not() {
     let evidence =
         format!("(schema: \"intrados.evidence/1\", items: [{}, {}])", core("A"), core("B"));
     fs::write(folder.path().join("evidence.ron"), evidence).unwrap();
-    let job = Job::default();
-    let scene = Scene::load(&folder.path().join("scene.ron"), &job).unwrap();
+    Scene::load(&folder.path().join("scene.ron"), &Job::default()).unwrap()
+}
+
+/// What grades by strength.
+fn by_strength() -> PredictSettings {
     let profile = Profile { by_strength: true, ..Profile::default() };
-    let settings = PredictSettings { profile, forecast: None, ..PredictSettings::default() };
-    let prediction = predict(&scene, settings, &Sources::default(), &job).unwrap();
+    PredictSettings { profile, forecast: None, ..PredictSettings::default() }
+}
+
+/// By a profile that grades by strength a stub under a jack has the damage that its bad concrete
+/// costs, and the states of that; one that nothing presses has that of its worst zone, which is said.
+#[test]
+fn what_damage_costs_is_graded_or_it_is_said_that_it_is_not() {
+    let prediction =
+        predict(&stubs(), by_strength(), &Sources::default(), &Job::default()).unwrap();
     let [a, b] = &prediction.members[..] else { panic!() };
     let cost = a.capacity.as_ref().unwrap().cost;
     assert!(a.by_strength && a.damage == Some(cost.value) && cost.value > 0.1, "{:?}", a.capacity);
@@ -126,6 +134,27 @@ fn what_damage_costs_is_graded_or_it_is_said_that_it_is_not() {
     let told = |line: &str| prediction.limits.iter().any(|l| l.contains(line));
     assert!(told("Not graded by strength") && told("is not computed: stub B."));
     assert!(told("member's strength that what is known of it costs"), "{:?}", prediction.limits);
+}
+
+/// A run that goes on from another computes no strength again, unless it knows of other losses.
+#[test]
+fn strengths_are_kept_with_the_losses_that_they_were_computed_with() {
+    let (scene, folder) = (stubs(), tempfile::tempdir().unwrap());
+    let run = |settings: PredictSettings, job: &Job| {
+        let mut parts = Set::resume(folder.path(), "key").unwrap();
+        let mut predictor = Predictor::new(&scene, settings, &Sources::default());
+        while predictor.advance_kept(&scene, &mut parts, "stubs", job)? {}
+        Ok::<_, PredictError>(predictor.finish(&scene).members)
+    };
+    let first = run(by_strength(), &Job::default()).unwrap();
+    assert!(first[0].capacity.is_some());
+    // Nothing can be computed any more.
+    let cancelled = Job::default();
+    cancelled.cancel();
+    assert_eq!(run(by_strength(), &cancelled).unwrap(), first);
+    let mut surer = by_strength();
+    surer.profile.fusion.unknown.clear();
+    assert!(matches!(run(surer, &cancelled), Err(PredictError::Cancelled(_))));
 }
 
 /// Half the strength that the class promises, in three cores of one place.

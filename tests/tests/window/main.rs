@@ -1032,6 +1032,13 @@ fn tendons_of_a_lining_are_drawn() {
     }
     window.click("⏹ Stop");
     window.until("its end", |w| !w.resource::<Analyses>().is_busy());
+    let kept = window.with(|w| match &w.resource::<Analyses>().get("T1").expect("it ran").work {
+        Work::Done(life) => Some((life.outcome.stopped, life.outcome.steps.len())),
+        _ => None,
+    });
+    assert!(kept.is_some_and(|(stopped, steps)| stopped && steps > 1), "{kept:?}");
+    let said = "⏹ Stopped: what had been found until then is shown.";
+    assert!(window.harness.query_by_label(said).is_some());
 }
 
 #[test]

@@ -59,9 +59,6 @@ impl Draft<'_> {
         };
         match ground.model {
             GroundModel::Springs { radial_mpa_m, tangential_mpa_m } => {
-                if vertical * cover <= 0.0 && water <= 0.0 {
-                    self.notes.push(UNPRESSED.into());
-                }
                 let springs = |face: HexFace| {
                     let (at, _) = self.model.mesh.face_middle(face);
                     Winkler {
@@ -70,6 +67,9 @@ impl Draft<'_> {
                         pressure: pressure(at),
                     }
                 };
+                if outer.iter().all(|&face| springs(face).pressure <= 0.0) {
+                    self.notes.push(UNPRESSED.into());
+                }
                 let around = |face| Bedding::Around {
                     axis: [axes.start, axes.unit[2]],
                     springs: springs(face),

@@ -360,6 +360,12 @@ impl<'s, 'm> March<'s, 'm> {
         Vec::from_iter(self.way.system.by.iter().copied()).join(", ")
     }
 
+    /// The last equilibrium; what solved on the way there is let go.
+    #[must_use]
+    pub(crate) fn into_history(self) -> History {
+        self.history
+    }
+
     /// Work so far, as [`MarchSettings::work`] counts it.
     #[must_use]
     pub(crate) fn spent(&self) -> f64 {

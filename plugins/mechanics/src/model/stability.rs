@@ -20,7 +20,7 @@ use nalgebra::DMatrix;
 use super::{Bedding, Equations, Failure, Ground, History, Point, System, Trial};
 use crate::{
     element::hex8,
-    sparse::{BlockMatrix, Constraints, Method, Solver},
+    sparse::{BlockMatrix, Constraints, Method, SolveError, Solver},
     tensor::Voigt,
 };
 
@@ -80,10 +80,11 @@ impl System<'_> {
                 other.iter_mut().for_each(Solver::release);
                 self.assemble_sound(history.time, matrix, job)?;
                 // Five to two dozen solutions of one matrix: a factor pays sooner than for one.
-                let Ok(made) = Solver::new(matrix, &constraints, Method::Once, &quiet) else {
-                    return Ok(None);
-                };
-                own.insert(made)
+                match Solver::new(matrix, &constraints, Method::Once, &quiet) {
+                    Ok(made) => own.insert(made),
+                    Err(why @ SolveError::Cancelled(_)) => return Err(why.into()),
+                    Err(_) => return Ok(None),
+                }
             }
         };
         let geometric = self.geometric(history, points);
@@ -103,8 +104,10 @@ impl System<'_> {
         let (mut basis, mut mu): (Vec<[Vec<f64>; 2]>, f64) = (Vec::new(), 0.0);
         let mut small = DMatrix::zeros(DIRECTIONS, DIRECTIONS);
         for k in 0..DIRECTIONS {
-            let Ok(found) = solver.solve(matrix, &load, &constraints, LINEAR, &quiet) else {
-                return Ok(None);
+            let found = match solver.solve(matrix, &load, &constraints, LINEAR, &quiet) {
+                Ok(found) => found,
+                Err(why @ SolveError::Cancelled(_)) => return Err(why.into()),
+                Err(_) => return Ok(None),
             };
             let (mut v, mut kv) = (found.x, load);
             for [w, kw] in &basis {

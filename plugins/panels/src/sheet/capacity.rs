@@ -80,7 +80,8 @@ pub(super) fn capacity(
         }
     };
     let analysis = mechanics.analyses.get(model);
-    let is_done = analysis.is_some_and(|a| matches!(a.work, Work::Done(_)));
+    let is_done =
+        analysis.is_some_and(|a| matches!(&a.work, Work::Done(life) if !life.outcome.stopped));
     ui.horizontal_wrapped(|ui| {
         let hint = tr!("Loads, pours, creep and damage over its whole life, as `intrados analyze`");
         if !is_done && ui.button(tr!("Compute its stress")).on_hover_text(hint).clicked() {
@@ -152,12 +153,14 @@ fn result(ui: &mut Ui, analysis: &Analysis, member: &Member, actions: &mut Actio
     if ui.link(tr!("See it over its life")).clicked() {
         actions.ask(Action::Tab("Stress"));
     }
-    outcome.strength.is_some()
+    outcome.strength.as_ref().is_some_and(|s| !s.stopped)
 }
 
 /// What a user must know before believing any of it.
 fn doubts(ui: &mut Ui, outcome: &Outcome) {
-    if !outcome.complaint.is_empty() {
+    if outcome.stopped {
+        ui.label(tr!("Its stress was stopped before its end: this is what had been found."));
+    } else if !outcome.complaint.is_empty() {
         ui.label(tr!("⚠ ended early: {}", term(&outcome.complaint)));
     }
     outcome.warnings.iter().for_each(|why| drop(ui.label(format!("⚠ {}", term(why)))));
@@ -189,14 +192,23 @@ fn stresses(ui: &mut Ui, own: &MemberOutcome) {
 /// Its load at failure, and how it fails.
 fn bears(ui: &mut Ui, strength: &Strength) {
     let peak = &strength.peak;
-    let text = tr!(
-        "It bears {} × what acts: {} kN at {} mm",
+    let [times, load, moved] = [
         fixed(peak.load_factor, 2),
         fixed(1e-3 * peak.load_n, 0),
-        fixed(1e3 * peak.displacement_m, 1)
-    );
+        fixed(1e3 * peak.displacement_m, 1),
+    ];
+    let (text, why) = match strength.mode {
+        Mode::None => (
+            tr!("It bears at least {} × what acts: {} kN at {} mm", times, load, moved),
+            measured(&strength.because),
+        ),
+        mode => (
+            tr!("It bears {} × what acts: {} kN at {} mm", times, load, moved),
+            tr!("and fails by {}: {}", term(mode.words()), measured(&strength.because)),
+        ),
+    };
     copied(ui, RichText::new(text).strong());
-    ui.label(tr!("and fails by {}: {}", term(strength.mode.words()), measured(&strength.because)));
+    ui.label(why);
     if let Some(yields) = &strength.yielding {
         ui.label(tr!("A bar yields first at {} × what acts.", fixed(yields.load_factor, 2)));
     }

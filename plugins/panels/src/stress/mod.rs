@@ -361,9 +361,7 @@ fn waiting(ui: &mut Ui, analysis: &Analysis) {
 fn state(ui: &mut Ui, analysis: &Analysis, part: &str) {
     match &analysis.work {
         Work::Running(_) => {}
-        Work::Cancelled => {
-            ui.label(tr!("⏹ Stopped: what had been found until then is shown."));
-        }
+        Work::Cancelled => stopped(ui),
         Work::Failed(why) => {
             ui.colored_label(ui.visuals().error_fg_color, tr!("⚠ Not computed: {}", term(why)));
         }
@@ -371,8 +369,14 @@ fn state(ui: &mut Ui, analysis: &Analysis, part: &str) {
     }
 }
 
+fn stopped(ui: &mut Ui) {
+    ui.label(tr!("⏹ Stopped: what had been found until then is shown."));
+}
+
 fn ended(ui: &mut Ui, outcome: &Outcome, part: &str) {
-    if !outcome.complaint.is_empty() {
+    if outcome.stopped {
+        stopped(ui);
+    } else if !outcome.complaint.is_empty() {
         let text = tr!("⚠ Ended early: {}", term(&outcome.complaint));
         ui.add(
             egui::Label::new(egui::RichText::new(&text).color(ui.visuals().warn_fg_color))

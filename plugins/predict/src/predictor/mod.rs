@@ -21,7 +21,9 @@ use intrados_damage::{
     ledger,
 };
 use intrados_forecast as forecast;
-use intrados_forecast::{Capacity, FORECAST, Forecast, ForecastError, ForecastSettings, forecast};
+use intrados_forecast::{
+    Capacity, FORECAST, Forecast, ForecastError, ForecastSettings, Losses, forecast,
+};
 use intrados_gauges as gauges;
 use intrados_gauges::{GAUGES, GaugeError, GaugeReading, monitoring};
 use intrados_mechanics::frame;
@@ -34,8 +36,7 @@ use intrados_survey::{
     surveyed,
 };
 use rayon::prelude::*;
-use serde::Deserialize;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::{
     CT, Origin, PredictError, PredictSettings, SliceReading,
@@ -89,7 +90,7 @@ pub struct Predictor {
     /// By model, the lives that have been computed.
     lives: BTreeMap<String, Vec<Forecast>>,
     /// By model, what has been computed of its strength; or why nothing has.
-    strengths: BTreeMap<String, Result<Option<Capacity>, String>>,
+    strengths: BTreeMap<String, Borne>,
     /// What every member's rest does to it, once a life has asked for it; or why nobody knows.
     frame: Option<Result<Option<frame::Whole>, String>>,
 }
@@ -102,6 +103,18 @@ struct Done {
     evidence: Option<evidence::Kept>,
     unused: BTreeMap<usize, String>,
     gauges: Vec<GaugeReading>,
+    strength: Option<Bears>,
+}
+
+/// What is known of a model's strength: [`Capacity`], none where nothing can be raised, or why
+/// nobody knows.
+type Borne = Result<Option<Capacity>, String>;
+
+/// What a model bears, and with what of its members lost: another run may know of other losses.
+#[derive(Serialize, Deserialize)]
+struct Bears {
+    losses: BTreeMap<String, Losses>,
+    found: Borne,
 }
 
 /// One piece of work.
@@ -419,12 +432,7 @@ impl Predictor {
     fn raise(&mut self, scene: &Scene, model: &str, job: &Job) -> Result<(), PredictError> {
         self.join(scene, job)?;
         job.relabel(self.label_of_strength(model));
-        let members = scene.structure.assembly(model).into_iter().flat_map(|a| &a.members);
-        let losses = members.filter_map(|id| {
-            let index = scene.members.iter().position(|m| m.id == *id)?;
-            Some((id.clone(), self.losses(index)))
-        });
-        let losses = losses.collect();
+        let losses = self.losses_of(scene, model);
         let (handed, _) = part_of(&self.frame, model);
         let found = match forecast::capacity(scene, model, handed, &losses, job) {
             Ok(found) => Ok(found),
@@ -570,7 +578,12 @@ impl Predictor {
                 let evidence = self.kept(*member, SURVEY)?;
                 Some(Done { fate, evidence, unused, ..Done::default() })
             }
-            Item::Life(_) | Item::Strength(_) | Item::Outside(..) | Item::Photograph(..) => None,
+            Item::Strength(model) => {
+                let found = self.strengths.get(model)?.clone();
+                let strength = Some(Bears { losses: self.losses_of(scene, model), found });
+                Some(Done { fate, strength, ..Done::default() })
+            }
+            Item::Life(_) | Item::Outside(..) | Item::Photograph(..) => None,
         }
     }
 
@@ -582,7 +595,8 @@ impl Predictor {
 
     /// Takes the next piece from an earlier run: whether more are to come. None where it is no such
     /// piece.
-    fn take_up(&mut self, Done { fate, slice, evidence, unused, gauges }: Done) -> Option<bool> {
+    fn take_up(&mut self, scene: &Scene, done: Done) -> Option<bool> {
+        let Done { fate, slice, evidence, unused, gauges, strength } = done;
         match self.queue.get(self.next)? {
             Item::Slice(item) => {
                 let readings = self.readings.get_mut(item.member)?;
@@ -600,9 +614,11 @@ impl Predictor {
                 self.told.extend(said.map(|e| (*member, e)));
                 self.unheard.extend(unused);
             }
-            Item::Life(_) | Item::Strength(_) | Item::Outside(..) | Item::Photograph(..) => {
-                return None;
+            Item::Strength(model) => {
+                let kept = strength.filter(|s| s.losses == self.losses_of(scene, model))?;
+                self.strengths.insert(model.clone(), kept.found);
             }
+            Item::Life(_) | Item::Outside(..) | Item::Photograph(..) => return None,
         }
         self.next += 1;
         self.fates.resize(self.next, fate);
@@ -629,7 +645,7 @@ impl Predictor {
                 parts.recall::<BTreeMap<String, Vec<Forecast>>>(&lives).unwrap_or_default(),
             );
         }
-        if let Some(more) = parts.recall(&name).and_then(|done| self.take_up(done)) {
+        if let Some(more) = parts.recall(&name).and_then(|done| self.take_up(scene, done)) {
             return Ok(more);
         }
         let known = self.lives.len();

@@ -176,7 +176,7 @@ impl Predictor {
 
     /// What is known to be lost of a member; where nobody looked, nothing, with the error that the
     /// profile declares for that.
-    pub(super) fn losses(&self, index: usize) -> Losses {
+    fn losses(&self, index: usize) -> Losses {
         let Gathered { evidence, whole, .. } = self.gather(index);
         let unknown = &self.settings.profile.fusion.unknown;
         let of = |cause: Cause, zone: usize| {
@@ -194,6 +194,16 @@ impl Predictor {
             concrete: std::array::from_fn(concrete),
             steel: std::array::from_fn(|zone| of(Cause::Steel, zone)),
         }
+    }
+
+    /// What is lost of the members of a model, by their ids.
+    pub(super) fn losses_of(&self, scene: &Scene, model: &str) -> BTreeMap<String, Losses> {
+        let members = scene.structure.assembly(model).into_iter().flat_map(|a| &a.members);
+        let of = |id: &String| {
+            let index = scene.members.iter().position(|m| m.id == *id)?;
+            Some((id.clone(), self.losses(index)))
+        };
+        members.filter_map(of).collect()
     }
 
     /// What is known of a member's strength.
