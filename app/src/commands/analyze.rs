@@ -733,7 +733,7 @@ fn bears(strength: &Strength) -> String {
     text += &format!("  failure: {}: {}\n", strength.mode.words(), strength.because);
     if let Some(ultimate) = &strength.ultimate {
         let ductility = strength.ductility.map_or(String::new(), |d| format!(", ductility {d:.1}"));
-        text += &format!("  a fifth is lost at {}{ductility}\n", at(ultimate));
+        text += &format!("  a fifth is lost, or steel breaks, at {}{ductility}\n", at(ultimate));
     }
     text + &format!("  followed until {}\n", strength.ended)
 }

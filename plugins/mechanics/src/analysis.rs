@@ -508,20 +508,21 @@ impl SteelPeaks {
     }
 
     fn tell(&self, prepared: &Prepared, history: &History, outcome: &mut Outcome) {
-        let Some(member) = prepared
-            .parts
-            .iter()
-            .position(|p| p.has_steel)
-            .and_then(|i| outcome.members.get_mut(i))
-        else {
-            return;
-        };
-        member.peak_bar_stress_pa = self.rods;
-        member.pipe = self.pipe.map(|(_, pipe)| pipe);
-        member.corrosion = corrosion(&prepared.model.steel, history.time);
-        for ((steel, &peak), works) in
-            prepared.model.steel.iter().zip(&self.peaks).zip(&history.steel)
+        let Some(first) = prepared.parts.iter().position(|p| p.has_steel) else { return };
+        if let Some(member) = outcome.members.get_mut(first) {
+            member.peak_bar_stress_pa = self.rods;
+            member.pipe = self.pipe.map(|(_, pipe)| pipe);
+        }
+        let model = &prepared.model;
+        let owners = owners(prepared, first);
+        for (part, member) in outcome.members.iter_mut().enumerate() {
+            let own = model.steel.iter().zip(&owners).filter(|(_, owner)| **owner == part);
+            member.corrosion = corrosion(own.map(|(steel, _)| steel), history.time);
+        }
+        for (((steel, &peak), works), &owner) in
+            model.steel.iter().zip(&self.peaks).zip(&history.steel).zip(&owners)
         {
+            let Some(member) = outcome.members.get_mut(owner) else { continue };
             let SteelKind::Tendon(tendon) = &steel.kind else {
                 member.peak_bar_stress_pa = member.peak_bar_stress_pa.max(peak);
                 continue;
@@ -556,7 +557,21 @@ impl SteelPeaks {
     }
 }
 
-fn corrosion(steel: &[Steel], time: f64) -> Option<Corrosion> {
+/// The part that each steel lies in; all of it is of the `first` that has steel, where no other has.
+fn owners(prepared: &Prepared, first: usize) -> Vec<usize> {
+    let steel = &prepared.model.steel;
+    if prepared.parts.iter().filter(|p| p.has_steel).count() == 1 {
+        return vec![first; steel.len()];
+    }
+    let mut part_of = vec![first; prepared.model.mesh.hexes.len()];
+    for (part, own) in prepared.parts.iter().enumerate().filter(|(_, own)| own.has_steel) {
+        own.hexes.iter().for_each(|&hex| part_of[hex as usize] = part);
+    }
+    let host = |steel: &Steel| steel.pieces.first().map_or(first, |piece| part_of[piece.host]);
+    steel.iter().map(host).collect()
+}
+
+fn corrosion<'a>(steel: impl Iterator<Item = &'a Steel>, time: f64) -> Option<Corrosion> {
     let (mut begins, mut worst, mut lost, mut whole, mut any) =
         (f64::INFINITY, 0.0_f64, 0.0, 0.0, false);
     for bar in steel {

@@ -34,7 +34,7 @@ pub enum Mode {
     Buckling,
     /// Tendons break.
     PrestressRupture,
-    /// Bars break.
+    /// Bars break before they have yielded under the loads that it bears most.
     BarRupture,
     /// Concrete tears that no steel holds.
     Tearing,
@@ -85,7 +85,7 @@ pub struct Strength {
     pub peak: CurvePoint,
     /// Where a bar, no stirrup, yields first.
     pub yielding: Option<CurvePoint>,
-    /// Where the load has fallen to [`FAILED`] of the peak.
+    /// Where the load has fallen to [`FAILED`] of the peak, or before that steel along it breaks.
     pub ultimate: Option<CurvePoint>,
     /// Displacement there over that where a bar yields first.
     pub ductility: Option<f64>,
@@ -534,7 +534,10 @@ impl<'a, 'm> Watch<'a, 'm> {
     fn tell(self, mut ended: String, mut stopped: bool, job: &Job) -> Result<Strength, Failure> {
         let peak = self.curve[self.peak];
         let after = &self.curve[self.peak..];
-        let ultimate = after.iter().find(|p| self.has_fallen(p, FAILED)).copied();
+        // Where steel breaks it is followed no further.
+        let breaks = self.broken.as_ref().filter(|(_, name)| !is_stirrup(name));
+        let fallen = after.iter().find(|p| self.has_fallen(p, FAILED));
+        let ultimate = fallen.or(breaks.and(after.last())).copied();
         let yielding = self.yielding.as_ref().map(|y| y.0);
         let ductility = ultimate
             .zip(yielding)
@@ -582,14 +585,22 @@ impl<'a, 'm> Watch<'a, 'm> {
         let at =
             |p: &CurvePoint| format!("{:.0} kN, {:.1} mm", 1e-3 * p.load_n, 1e3 * p.displacement_m);
         let broken = self.broken.as_ref();
-        if let Some((mode, name)) = broken.filter(|(_, name)| !is_stirrup(name)) {
-            return Ok((*mode, format!("{name} breaks")));
-        }
         let has_failed = has_failed || broken.is_some();
         // A peak may be that of the last crack, and bars yield right after it.
         let is_before =
             |y: &CurvePoint| y.displacement_m <= peak.displacement_m || !self.has_fallen(y, FALLS);
         let yielded = self.yielding.as_ref().filter(|(y, _)| is_before(y));
+        match (broken.filter(|(_, name)| !is_stirrup(name)), yielded) {
+            // Its grade tells the least strain at which a bar breaks; what yielded before has failed.
+            (Some((Mode::BarRupture, name)), Some((y, first))) => {
+                return Ok((
+                    Mode::Yielding,
+                    format!("{first} yields at {}, then {name} breaks", at(y)),
+                ));
+            }
+            (Some((mode, name)), _) => return Ok((*mode, format!("{name} breaks"))),
+            (None, _) => {}
+        }
         let after =
             yielded.map_or(String::new(), |(y, name)| format!("; {name} yields at {}", at(y)));
         let opened = self.opened();

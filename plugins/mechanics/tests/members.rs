@@ -575,10 +575,10 @@ fn cubes_that_miss_the_volume_are_made_smaller_or_refused() {
 }
 
 /// Half of a beam, its middle at the end of the axis, pressed by a jack near there.
-fn half_beam(loading: &str) -> Prepared {
+fn half_beam(loading: &str, bars: u32) -> Prepared {
     let scene = from_text(&format!(
         "members: [(id: \"B\", at: (0, 0, 0), concrete: \"C30/37\", body: Beam(section: Rectangle(width_m: 0.2, depth_m: 0.4), length_m: 1.1,
-                reinforcement: (cover_mm: 35, bars: [Row(side_deg: 180, count: 2, diameter_mm: 12)], stirrups: (diameter_mm: 8, spacing_mm: 100))))],
+                reinforcement: (cover_mm: 35, bars: [Row(side_deg: 180, count: 2, diameter_mm: {bars})], stirrups: (diameter_mm: 8, spacing_mm: 100))))],
              supports: [(member: \"B\", place: Surface(from: 0.0909, to: 0.0909, side_deg: 180), hold: Directions(x: false, y: true, z: true)),
                 (member: \"B\", place: End, hold: Symmetry)],
              loads: [(name: \"jack\", action: Force(place: Surface(from: 0.9, to: 1, side_deg: 0), force_kn: (0, -10, 0)), history: [(28, 0)], loading: {loading})]"
@@ -592,7 +592,7 @@ fn half_beam(loading: &str) -> Prepared {
 #[test]
 fn a_beam_is_raised_until_its_bars_have_yielded() {
     let raised = |loading: &str| {
-        let prepared = half_beam(loading);
+        let prepared = half_beam(loading, 12);
         let life =
             analyze(&prepared, MarchSettings::of_life(), &Job::default(), &mut ()).unwrap().0;
         life.strength.unwrap()
@@ -605,15 +605,28 @@ fn a_beam_is_raised_until_its_bars_have_yielded() {
     let peak = found.peak.load_n / by_hand;
     assert!((1.0..1.3).contains(&peak), "{peak} {}", found.because);
     // With so few bars they break where the one crack is, long after they have yielded.
-    assert_eq!(found.mode, Mode::BarRupture, "{} {}", found.because, found.ended);
-    let yielding = found.yielding.map_or(f64::NAN, |y| y.displacement_m);
-    let broken = found.curve[found.curve.len() - 1].displacement_m;
-    assert!(broken / yielding > 1.5, "{yielding} {broken}");
+    assert_eq!(found.mode, Mode::Yielding, "{} {}", found.because, found.ended);
+    assert!(found.because.ends_with("breaks"), "{}", found.because);
+    let broken = found.curve[found.curve.len() - 1];
+    assert!(found.ultimate == Some(broken) && found.ductility > Some(1.5), "{found:?}");
     assert!(found.loads == ["jack"] && found.curve.len() > 20, "{}", found.ended);
     let far = raised("Displacement(to_mm: 2)");
     assert!(far.ended.contains("2.0 mm asked for"), "{}", far.ended);
     let last = far.curve[far.curve.len() - 1];
     assert!((last.displacement_m.abs() - 2e-3).abs() < 1e-6, "{last:?}");
+}
+
+/// With two bars of 6 mm the same beam bears most as it cracks, and its bars break where it has:
+/// that they yield before they do so is no warning.
+#[test]
+fn bars_that_bear_less_than_the_concrete_did_break() {
+    let beam = half_beam("Automatic", 6);
+    let life = analyze(&beam, MarchSettings::of_life(), &Job::default(), &mut ()).unwrap().0;
+    let found = life.strength.unwrap();
+    // f_ct W, and what the concrete bears past its first crack.
+    let cracks = 2.9e6 * 0.2 * 0.4_f64.powi(2) / 6.0 / 0.95;
+    assert!((1.0..1.6).contains(&(found.peak.load_n / cracks)), "{found:?}");
+    assert_eq!(found.mode, Mode::BarRupture, "{} {}", found.because, found.ended);
 }
 
 /// Cancels a job once it has seen so many equilibria.
@@ -647,7 +660,7 @@ fn what_is_stopped_is_kept_until_then() {
     let none = analyze(&column, settings, &job, &mut Cancels(&job, 3)).map(drop);
     assert!(none.is_err_and(|why| why.is_cancelled()));
 
-    let beam = half_beam("Displacement(to_mm: 0.1)");
+    let beam = half_beam("Displacement(to_mm: 0.1)", 12);
     let whole = analyze(&beam, settings, &Job::default(), &mut ()).unwrap().0;
     let part = stopped(&beam, whole.steps.len() + 4);
     assert!(part.stopped && part.steps == whole.steps && !whole.stopped, "{}", part.complaint);

@@ -226,7 +226,7 @@ class Strength:
     yielding: CurvePoint | None
     """Where a bar, no stirrup, yields first."""
     ultimate: CurvePoint | None
-    """Where a fifth of the peak is lost."""
+    """Where a fifth of the peak is lost, or before that steel along it breaks."""
     ductility: float | None
     mode: str
     """How it fails: ``Yielding``, ``DiagonalTension`` …, ``None`` as a word where it did not."""

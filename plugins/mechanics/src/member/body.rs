@@ -250,6 +250,10 @@ impl Draft<'_> {
             });
         }
         let prefix = format!("{SEGMENTS}/");
+        let has_steel = matches!(
+            &self.member.body,
+            Some(Body::Tunnel { segments: Some(s), .. }) if s.reinforcement.is_some()
+        );
         for (name, elements) in
             mesh.element_sets.iter().filter(|(name, _)| name.starts_with(&prefix))
         {
@@ -258,7 +262,7 @@ impl Draft<'_> {
                 .filter_map(|e| if let ElementId::Hex(h) = e { Some(*h) } else { None })
                 .collect();
             let id = format!("{}/{}", self.member.id, &name[prefix.len()..]);
-            parts.push(Part { id, kind: MemberKind::Segment, hexes, ..self.part() });
+            parts.push(Part { id, kind: MemberKind::Segment, hexes, has_steel, ..self.part() });
         }
         parts
     }

@@ -11,6 +11,7 @@ use crate::{
     file::{self, Assumed, CLASSES, Detail, SceneFile},
     structure::{
         Action, BarEnd, Bars, Body, Date, Exposure, Grade, Lap, Load, Reinforcement, Section,
+        SegmentBars,
     },
 };
 
@@ -438,6 +439,7 @@ impl List<'_> {
                     self.number("length of a ring", "m", Some(s.ring_m), at("ring_m"));
                     let thickness = Some(s.thickness_m);
                     self.number("thickness of segments", "m", thickness, at("thickness_m"));
+                    self.segment_bars(s.reinforcement.as_deref(), path);
                 }
                 if let Some(lining) = inner_lining {
                     let at = |field| place(&[Named("inner_lining"), Named(field)]);
@@ -453,6 +455,27 @@ impl List<'_> {
                 }
             }
         }
+    }
+
+    fn segment_bars(&mut self, said: Option<&SegmentBars>, path: &[Step]) {
+        self.group("Bars of segments");
+        let place = |steps: &[Step]| {
+            at(path, &[&[Named("segments"), Named("reinforcement")], steps].concat())
+        };
+        self.number("cover", "mm", said.map(|r| r.cover_mm), place(&[Named("cover_mm")]));
+        let grades = Grade::names().split(", ").map(str::to_owned).collect();
+        let grade = said.map_or(String::new(), |r| r.steel.clone());
+        self.add("steel", "", FieldKind::OneOf(grades), grade, place(&[Named("steel")]));
+        self.note("left out: B500B");
+        let hoops = said.and_then(|r| r.hoops.as_ref());
+        let of_hoops = |field| place(&[Named("hoops"), Named(field)]);
+        self.number("diameter of hoops", "mm", hoops.map(|h| h.diameter_mm), of_hoops("diameter_mm"));
+        self.number("hoops every", "mm", hoops.map(|h| h.spacing_mm), of_hoops("spacing_mm"));
+        let bars = said.and_then(|r| r.bars.as_ref());
+        let of_bars = |field| place(&[Named("bars"), Named(field)]);
+        self.count("bars along the axis at a face", bars.map(|b| b.count), of_bars("count"));
+        self.number("their diameter", "mm", bars.map(|b| b.diameter_mm), of_bars("diameter_mm"));
+        self.note("what hoops are, and what bars are, goes together");
     }
 
     /// The length of a member's axis, m.

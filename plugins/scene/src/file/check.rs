@@ -255,14 +255,17 @@ impl Body {
                 of_bar(reinforcement, *length_m) + tendons.len() as f32
             }
             Self::Tunnel { length_m, segments, inner_lining, .. } => {
-                let segments = segments
-                    .as_ref()
-                    .map_or(0.0, |s| length_m / s.ring_m.max(0.05) * s.count as f32);
+                let bars = |b: &Option<LiningBars>| b.as_ref().map_or(0.0, |b| 2.0 * b.count as f32);
+                let segments = segments.as_ref().map_or(0.0, |s| {
+                    let steel = s.reinforcement.as_ref().map_or(0.0, |r| {
+                        bars(&r.bars) + 2.0 * stirrups(&r.hoops, s.ring_m.min(*length_m))
+                    });
+                    length_m / s.ring_m.max(0.05) * s.count as f32 * (1.0 + steel)
+                });
                 let lining = inner_lining.as_ref().map_or(0.0, |l| {
-                    let bars = l.bars.as_ref().map_or(0.0, |b| 2.0 * b.count as f32);
                     let tendons =
                         l.tendons.as_ref().map_or(0.0, |t| length_m / t.spacing_m.max(0.02));
-                    bars + tendons + 2.0 * stirrups(&l.hoops, *length_m)
+                    bars(&l.bars) + tendons + 2.0 * stirrups(&l.hoops, *length_m)
                 });
                 segments + lining
             }
@@ -985,29 +988,47 @@ impl Checker<'_> {
         }
         let room = 250.0 * s.ring_m.min(radius_m / s.count.max(1) as f32);
         self.within("joint.gap_mm", s.joint.gap_mm, 0.0, room.clamp(0.0, 100.0));
+        if let Some(r) = &s.reinforcement {
+            self.at("reinforcement", |c| {
+                c.cover(r.cover_mm);
+                c.grade(&r.steel, r.f_y_mpa);
+                c.cage(r.cover_mm, r.hoops.as_ref(), r.bars.as_ref(), [s.thickness_m, s.ring_m]);
+            });
+        }
     }
 
-    fn inner_lining(&mut self, l: &InnerLining, radius_m: f32, length_m: f32) {
-        self.within("thickness_m", l.thickness_m, 0.02, 10.0);
-        self.cover(l.cover_mm);
-        self.grade(&l.steel, l.f_y_mpa);
+    /// Hoops and bars at both faces of a shell, of its thickness and length, m.
+    fn cage(
+        &mut self,
+        cover_mm: f32,
+        hoops: Option<&Stirrups>,
+        bars: Option<&LiningBars>,
+        [thickness_m, length_m]: [f32; 2],
+    ) {
         let mut steel = 0.0;
-        if let Some(h) = &l.hoops {
+        if let Some(h) = hoops {
             self.at("hoops", |c| c.stirrups(h, length_m));
             steel += h.diameter_mm;
         }
-        if let Some(b) = &l.bars {
-            self.count("bars.count", b.count, 3, 5000);
+        if let Some(b) = bars {
+            self.count("bars.count", b.count, 1, 5000);
             self.within("bars.diameter_mm", b.diameter_mm, 1.0, 100.0);
             steel += b.diameter_mm;
         }
-        if 2.0 * (l.cover_mm + steel) > 1000.0 * l.thickness_m {
+        if 2.0 * (cover_mm + steel) > 1000.0 * thickness_m {
             self.error(
                 "cover_mm",
                 "RANGE",
                 "cover, hoops and bars do not fit into the thickness: make one of them smaller",
             );
         }
+    }
+
+    fn inner_lining(&mut self, l: &InnerLining, radius_m: f32, length_m: f32) {
+        self.within("thickness_m", l.thickness_m, 0.02, 10.0);
+        self.cover(l.cover_mm);
+        self.grade(&l.steel, l.f_y_mpa);
+        self.cage(l.cover_mm, l.hoops.as_ref(), l.bars.as_ref(), [l.thickness_m, length_m]);
         if let Some(t) = &l.tendons {
             self.at("tendons", |c| {
                 if c.within("spacing_m", t.spacing_m, 0.02, 1000.0)

@@ -6,12 +6,14 @@ use glam::{Vec2, Vec3};
 
 use super::{
     Outline, frame,
-    steel::{arc, bars, spaced, stirrup, stirrup_places, tendon_line},
+    steel::{Cage, Shape, arc, bars, rings, spaced, stirrup, stirrup_places, tendon_line},
 };
 use crate::{
     Frame, Part,
     file::Member,
-    structure::{Body, Reinforcement, Section, SteelLine, Tendon},
+    structure::{
+        Body, Grade, InnerLining, Reinforcement, Section, Segments, SteelLine, Tendon,
+    },
 };
 
 /// All steel of a member.
@@ -31,7 +33,7 @@ pub(crate) fn lines_of(body: &Body, frame: Frame) -> Vec<SteelLine> {
         Body::BoxGirder { section, length_m, reinforcement, tendons } => {
             prism(Outline::girder(section), *length_m, reinforcement.as_ref(), tendons)
         }
-        Body::Tunnel { .. } => lining(body),
+        Body::Tunnel { .. } => tunnel(body),
     };
     placed(lines, frame)
 }
@@ -112,38 +114,56 @@ fn prism(
     lines
 }
 
-fn lining(body: &Body) -> Vec<SteelLine> {
-    let Body::Tunnel { radius_m: radius, length_m: length, inner_lining: Some(l), .. } = body
-    else {
+fn tunnel(body: &Body) -> Vec<SteelLine> {
+    let Body::Tunnel { radius_m, length_m, segments, cushion_mm, inner_lining, .. } = body else {
         return Vec::new();
     };
-    let (radius, length, outer) = (*radius, *length, radius + l.thickness_m);
-    let (cover, grade) = (l.cover_mm / 1000.0, l.grade());
-    let hoop = l.hoops.as_ref().map_or(0.0, |h| h.diameter_mm / 1000.0);
+    let (mut lines, mut radius) = (Vec::new(), *radius_m);
+    if let Some(l) = inner_lining {
+        lines.extend(lining(l, radius, *length_m));
+        radius += l.thickness_m + cushion_mm / 1000.0;
+    }
+    if let Some(s) = segments {
+        lines.extend(of_segments(s, radius, *length_m));
+    }
+    lines
+}
+
+/// The lines of a cage, turned about the axis and moved along it.
+fn copies<'a>(
+    cage: &'a Cage,
+    grade: Option<Grade>,
+    of: &'a str,
+    [turn, begin]: [f32; 2],
+) -> impl Iterator<Item = SteelLine> + 'a {
+    let turn = Vec2::from_angle(turn);
+    cage.lines.iter().map(move |(name, shape, at)| {
+        let Shape { line, diameter, part, .. } = &cage.shapes[*shape];
+        let place = |p: &Vec3| {
+            let p = *p + *at;
+            turn.rotate(p.truncate()).extend(p.z + begin)
+        };
+        let line = line.iter().map(place).collect();
+        SteelLine { grade, ..SteelLine::new(format!("{of}{name}"), *part, *diameter, line) }
+    })
+}
+
+fn of_segments(s: &Segments, radius: f32, length: f32) -> Vec<SteelLine> {
+    let Some(steel) = &s.reinforcement else { return Vec::new() };
     let mut lines = Vec::new();
-    for (face, sign, side) in [(radius, 1.0, "inner"), (outer, -1.0, "outer")] {
-        if let Some(h) = &l.hoops {
-            let shape = arc(face + sign * (cover + 0.5 * hoop), 0.0, TAU, 0.0);
-            lines.extend(stirrup_places(h, length, cover.min(0.4 * length)).enumerate().map(
-                |(i, z)| {
-                    let line = shape.iter().map(|p| *p + Vec3::Z * z).collect();
-                    let name = format!("{side} hoop {}", i + 1);
-                    SteelLine { grade, ..SteelLine::new(name, Part::Stirrup, hoop, line) }
-                },
-            ));
-        }
-        if let Some(b) = &l.bars {
-            let diameter = b.diameter_mm / 1000.0;
-            let end = cover.min(0.4 * length);
-            let r = face + sign * (cover + hoop + 0.5 * diameter);
-            lines.extend((0..b.count).map(|i| {
-                let p = r * Vec2::from_angle(TAU * i as f32 / b.count as f32);
-                let (name, line) =
-                    (format!("{side} bar {}", i + 1), vec![p.extend(end), p.extend(length - end)]);
-                SteelLine { grade, ..SteelLine::new(name, Part::Bar, diameter, line) }
-            }));
+    for ring in rings(s, length) {
+        let cage = Cage::of_segment(s, steel, radius, &ring);
+        for (k, turn) in ring.turns(s).enumerate() {
+            let name = format!("R{}/S{} ", ring.number, k + 1);
+            lines.extend(copies(&cage, steel.grade(), &name, [turn, ring.concrete[0]]));
         }
     }
+    lines
+}
+
+fn lining(l: &InnerLining, radius: f32, length: f32) -> Vec<SteelLine> {
+    let cage = Cage::of_lining(l, radius, length);
+    let mut lines: Vec<SteelLine> = copies(&cage, l.grade(), "", [0.0, 0.0]).collect();
     if let Some(t) = &l.tendons {
         lines.extend(spaced(length, 0.5 * t.spacing_m.min(length), t.spacing_m).enumerate().map(
             |(i, z)| {

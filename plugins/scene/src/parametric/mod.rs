@@ -27,7 +27,7 @@ use crate::{
         ASSUMED_CONCRETE, Body, BoxSection, InnerLining, Reinforcement, Section, Segments, Tendon,
     },
 };
-use steel::Outline;
+use steel::{Cage, Outline, span};
 
 pub(crate) use fitted::{Triangle, lines_in};
 pub(crate) use lines::{lines_of, steel_lines};
@@ -349,46 +349,9 @@ impl Builder<'_> {
         let id = &self.member.id;
         let mesh = self.mesh(solid::ring(radius, outer, 0.0, TAU, length));
         self.place(format!("{id} concrete"), mesh, Mat4::IDENTITY, member, Part::Concrete);
-        let cover = l.cover_mm / 1000.0;
-        let hoop = l.hoops.as_ref().map_or(0.0, |h| h.diameter_mm / 1000.0);
-        for (face, sign) in [(radius, 1.0), (outer, -1.0)] {
-            let side = if sign > 0.0 { "inner" } else { "outer" };
-            if let Some(h) = &l.hoops {
-                let line = steel::arc(face + sign * (cover + 0.5 * hoop), 0.0, TAU, 0.0);
-                let mesh = self.mesh(solid::tube(line.get(1..).unwrap_or_default(), hoop, true));
-                for (i, z) in steel::stirrup_places(h, length, cover.min(0.4 * length)).enumerate()
-                {
-                    self.job.step(i, 0)?;
-                    self.place(
-                        format!("{id} {side} hoop {}", i + 1),
-                        mesh,
-                        Mat4::from_translation(Vec3::Z * z),
-                        member,
-                        Part::Stirrup,
-                    );
-                }
-            }
-            if let Some(b) = &l.bars {
-                let diameter = b.diameter_mm / 1000.0;
-                let end = cover.min(0.4 * length);
-                let mesh = self.mesh(solid::tube(
-                    &[Vec3::Z * end, Vec3::Z * (length - end)],
-                    diameter,
-                    false,
-                ));
-                let r = face + sign * (cover + hoop + 0.5 * diameter);
-                for i in 0..b.count {
-                    let p = r * Vec2::from_angle(TAU * i as f32 / b.count as f32);
-                    self.place(
-                        format!("{id} {side} bar {}", i + 1),
-                        mesh,
-                        Mat4::from_translation(p.extend(0.0)),
-                        member,
-                        Part::Bar,
-                    );
-                }
-            }
-        }
+        let (of, cage) = (format!("{id} "), Cage::of_lining(l, radius, length));
+        let meshes = self.tubes(&cage);
+        self.copies(&cage, &meshes, &of, Mat4::IDENTITY, member)?;
         if let Some(t) = &l.tendons {
             // One turn less the anchorage's recess.
             const RECESS: f32 = 0.02;
@@ -413,36 +376,64 @@ impl Builder<'_> {
         Ok(())
     }
 
+    /// The meshes of a cage's shapes.
+    fn tubes(&mut self, cage: &Cage) -> Vec<usize> {
+        let tube = |s: &steel::Shape| {
+            solid::tube(s.line.get(usize::from(s.closed)..).unwrap_or_default(), s.diameter, s.closed)
+        };
+        cage.shapes.iter().map(|shape| self.mesh(tube(shape))).collect()
+    }
+
+    /// Places the lines of a cage; their names begin with `of`.
+    fn copies(
+        &mut self,
+        cage: &Cage,
+        meshes: &[usize],
+        of: &str,
+        local: Mat4,
+        member: usize,
+    ) -> Result<(), LoadError> {
+        for (i, (name, shape, at)) in cage.lines.iter().enumerate() {
+            self.job.step(i, 0)?;
+            let local = local * Mat4::from_translation(*at);
+            let part = cage.shapes[*shape].part;
+            self.place(format!("{of}{name}"), meshes[*shape], local, member, part);
+        }
+        Ok(())
+    }
+
     fn segments(&mut self, s: &Segments, radius: f32, length: f32) -> Result<(), LoadError> {
         let outer = radius + s.thickness_m;
         let class = s.concrete.as_ref().or(self.member.concrete.as_ref()).cloned();
-        let gap = s.joint.gap_mm / 1000.0;
-        let turn = TAU / s.count as f32;
-        // Half a gap at each joint, measured at the outer face.
-        let edge = 0.5 * gap / outer;
-        let rings = s.rings(length);
-        let mut last: Option<(f32, usize)> = None;
-        for r in 0..rings {
-            self.job.step(r as usize, rings as usize)?;
-            let begin = r as f32 * s.ring_m;
-            let ring = s.ring_m.min(length - begin);
-            let gap = gap.min(0.2 * ring);
-            let mesh = match last {
-                Some((l, mesh)) if (l - ring).abs() < 1e-6 => mesh,
-                _ => self.mesh(solid::ring(radius, outer, edge, turn - edge, ring - gap)),
-            };
-            last = Some((ring, mesh));
-            let volume =
-                annulus(radius, outer) * f64::from((turn - 2.0 * edge) / TAU * (ring - gap));
+        let [from, to] = span(s, radius);
+        // Rings of one length are alike.
+        let mut last: Option<(f32, usize, Option<(Cage, Vec<usize>)>)> = None;
+        for ring in steel::rings(s, length) {
+            self.job.step(ring.number as usize, s.rings(length) as usize)?;
+            let [begin, long] = ring.concrete;
+            let alike = last.take().filter(|(l, ..)| (l - long).abs() < 1e-6);
+            let (_, mesh, laid) = last.insert(match alike {
+                Some(alike) => alike,
+                None => {
+                    let mesh = self.mesh(solid::ring(radius, outer, from, to, long));
+                    let cage = s.reinforcement.as_ref();
+                    let cage = cage.map(|steel| Cage::of_segment(s, steel, radius, &ring));
+                    let laid = cage.map(|cage| {
+                        let meshes = self.tubes(&cage);
+                        (cage, meshes)
+                    });
+                    (long, mesh, laid)
+                }
+            });
+            let volume = annulus(radius, outer) * f64::from((to - from) / TAU * long);
             let along = self.frame.axis.normalize_or_zero();
             let frame = Frame {
-                start: self.frame.start + along * begin,
-                axis: along * ring,
+                start: self.frame.start + along * ring.along[0],
+                axis: along * ring.along[1],
                 zero: self.frame.zero,
             };
-            let first = s.first_joint_deg + if r % 2 == 1 { s.stagger_deg } else { 0.0 };
-            for k in 0..s.count {
-                let id = format!("{}/R{}/S{}", self.member.id, r + 1, k + 1);
+            for (k, turn) in ring.turns(s).enumerate() {
+                let id = format!("{}/R{}/S{}", self.member.id, ring.number, k + 1);
                 let member = self.enter(
                     id.clone(),
                     id.clone(),
@@ -451,10 +442,12 @@ impl Builder<'_> {
                     volume,
                     class.as_deref(),
                 );
-                let rotation = Quat::from_rotation_z(first.to_radians() + k as f32 * turn);
                 let local =
-                    Mat4::from_rotation_translation(rotation, Vec3::Z * (begin + 0.5 * gap));
-                self.place(format!("{id} concrete"), mesh, local, member, Part::Concrete);
+                    Mat4::from_rotation_translation(Quat::from_rotation_z(turn), Vec3::Z * begin);
+                self.place(format!("{id} concrete"), *mesh, local, member, Part::Concrete);
+                if let Some((cage, meshes)) = laid {
+                    self.copies(cage, meshes, &format!("{id} "), local, member)?;
+                }
             }
         }
         Ok(())

@@ -5,7 +5,13 @@ use std::f32::consts::{FRAC_1_SQRT_2, FRAC_PI_2, PI, TAU};
 
 use glam::{Vec2, Vec3};
 
-use crate::structure::{BarEnd, Bars, Bond, BoxSection, Reinforcement, Stirrups, bent};
+use crate::{
+    Part,
+    structure::{
+        BarEnd, Bars, Bond, BoxSection, InnerLining, LiningBars, Reinforcement, SegmentBars,
+        Segments, Stirrups, bent,
+    },
+};
 
 /// The outline that steel keeps its cover from.
 #[derive(Debug, Clone, Copy)]
@@ -300,6 +306,142 @@ fn natural_spline(z: &[f64], values: &[f64]) -> Vec<f64> {
         curvature[i] -= upper[i] * curvature[i + 1];
     }
     curvature
+}
+
+/// Hoops and bars at both faces of a shell about the z axis, or of a piece of one: what linings and
+/// segments have.
+pub(super) struct Cage {
+    /// What its lines are copies of.
+    pub shapes: Vec<Shape>,
+    /// Name, number of the shape, and where its origin is.
+    pub lines: Vec<(String, usize, Vec3)>,
+}
+
+/// A line of steel that is copied.
+pub(super) struct Shape {
+    pub line: Vec<Vec3>,
+    /// Whether it ends where it begins.
+    pub closed: bool,
+    pub diameter: f32,
+    pub part: Part,
+}
+
+/// The concrete that a cage lies in, m and radians.
+struct Shell {
+    /// Of its inner and its outer face.
+    radii: [f32; 2],
+    /// From where to where; none: all around.
+    span: Option<[f32; 2]>,
+    /// Along z, from 0.
+    length: f32,
+    cover: f32,
+}
+
+/// A ring of segments: where it lies, m and radians.
+pub(super) struct Ring {
+    /// From 1.
+    pub number: u32,
+    /// Where it begins on the axis, and how long it is with half of the joints beside it.
+    pub along: [f32; 2],
+    /// The same of its concrete.
+    pub concrete: [f32; 2],
+    /// Angle of its first joint.
+    first: f32,
+}
+
+impl Ring {
+    /// Angles from which its segments begin.
+    pub(super) fn turns(&self, s: &Segments) -> impl Iterator<Item = f32> {
+        let (first, turn) = (self.first, TAU / s.count as f32);
+        (0..s.count).map(move |k| first + k as f32 * turn)
+    }
+}
+
+pub(super) fn rings(s: &Segments, length: f32) -> impl Iterator<Item = Ring> {
+    (0..s.rings(length)).map(move |r| {
+        let begin = r as f32 * s.ring_m;
+        let ring = s.ring_m.min(length - begin);
+        let gap = (s.joint.gap_mm / 1000.0).min(0.2 * ring);
+        let first = s.first_joint_deg + if r % 2 == 1 { s.stagger_deg } else { 0.0 };
+        Ring {
+            number: r + 1,
+            along: [begin, ring],
+            concrete: [begin + 0.5 * gap, ring - gap],
+            first: first.to_radians(),
+        }
+    })
+}
+
+/// Angles between which the concrete of a segment lies that begins at 0: half a gap at each joint,
+/// measured at the outer face.
+pub(super) fn span(s: &Segments, radius: f32) -> [f32; 2] {
+    let edge = 0.5 * (s.joint.gap_mm / 1000.0) / (radius + s.thickness_m);
+    [edge, TAU / s.count as f32 - edge]
+}
+
+impl Cage {
+    pub(super) fn of_lining(l: &InnerLining, radius: f32, length: f32) -> Self {
+        let radii = [radius, radius + l.thickness_m];
+        let shell = Shell { radii, span: None, length, cover: l.cover_mm / 1000.0 };
+        Self::new(&shell, l.hoops.as_ref(), l.bars.as_ref())
+    }
+
+    /// Of a segment of a ring from angle 0 on; z counts from where its concrete begins.
+    pub(super) fn of_segment(s: &Segments, steel: &SegmentBars, radius: f32, ring: &Ring) -> Self {
+        let shell = Shell {
+            radii: [radius, radius + s.thickness_m],
+            span: Some(span(s, radius)),
+            length: ring.concrete[1],
+            cover: steel.cover_mm / 1000.0,
+        };
+        Self::new(&shell, steel.hoops.as_ref(), steel.bars.as_ref())
+    }
+
+    fn new(shell: &Shell, hoops: Option<&Stirrups>, bars: Option<&LiningBars>) -> Self {
+        let Shell { radii, span, length, cover } = *shell;
+        let hoop = hoops.map_or(0.0, |h| h.diameter_mm / 1000.0);
+        let end = cover.min(0.4 * length);
+        let mut cage = Self { shapes: Vec::new(), lines: Vec::new() };
+        for (face, sign, side) in [(radii[0], 1.0, "inner"), (radii[1], -1.0, "outer")] {
+            if let Some(h) = hoops {
+                let r = face + sign * (cover + 0.5 * hoop);
+                let [from, to] = span.map_or([0.0, TAU], |span| within(span, cover / r));
+                let line = arc(r, from, to, 0.0);
+                let places = stirrup_places(h, length, end);
+                let named = |(i, z)| (format!("{side} hoop {}", i + 1), cage.shapes.len(), Vec3::Z * z);
+                let lines: Vec<_> = places.enumerate().map(named).collect();
+                cage.lines.extend(lines);
+                let closed = span.is_none();
+                cage.shapes.push(Shape { line, closed, diameter: hoop, part: Part::Stirrup });
+            }
+            if let Some(b) = bars {
+                let diameter = b.diameter_mm / 1000.0;
+                let r = face + sign * (cover + hoop + 0.5 * diameter);
+                let angle = |i: u32| match span {
+                    None => TAU * i as f32 / b.count as f32,
+                    Some(span) => {
+                        let [from, to] = within(span, (cover + 0.5 * diameter) / r);
+                        let share = if b.count > 1 { i as f32 / (b.count - 1) as f32 } else { 0.5 };
+                        from + share * (to - from)
+                    }
+                };
+                let shape = cage.shapes.len();
+                cage.lines.extend((0..b.count).map(|i| {
+                    let at = r * Vec2::from_angle(angle(i));
+                    (format!("{side} bar {}", i + 1), shape, at.extend(0.0))
+                }));
+                let line = vec![Vec3::Z * end, Vec3::Z * (length - end)];
+                cage.shapes.push(Shape { line, closed: false, diameter, part: Part::Bar });
+            }
+        }
+        cage
+    }
+}
+
+/// A span less so much at both ends; of one that is shorter than that its middle.
+fn within([from, to]: [f32; 2], less: f32) -> [f32; 2] {
+    let less = less.min(0.4 * (to - from));
+    [from + less, to - less]
 }
 
 /// An arc about the z axis at `z`, radians.

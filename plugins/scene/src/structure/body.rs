@@ -465,6 +465,34 @@ pub struct Segments {
     /// Class, if not the member's.
     #[serde(default)]
     pub concrete: Option<String>,
+    /// Bars of each.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reinforcement: Option<Box<SegmentBars>>,
+}
+
+/// Bars of a segment, at both of its faces; they end in it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SegmentBars {
+    /// Concrete outside the outermost steel, at faces and joints, mm.
+    #[serde(default = "segment_cover")]
+    pub cover_mm: f32,
+    /// Grade ([`Grade::named`]).
+    #[serde(default = "b500")]
+    pub steel: String,
+    /// Yield stress where it is not the grade's: measured or agreed upon, MPa.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub f_y_mpa: Option<f32>,
+    /// Around the ring.
+    #[serde(default)]
+    pub hoops: Option<Stirrups>,
+    /// Along the axis, inside of the hoops: how many at each face.
+    #[serde(default)]
+    pub bars: Option<LiningBars>,
+}
+
+fn segment_cover() -> f32 {
+    40.0
 }
 
 /// A dry joint: no tension, Coulomb friction.
@@ -534,7 +562,7 @@ fn lining_cover() -> f32 {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LiningBars {
-    /// Around each face.
+    /// At each face.
     pub count: u32,
     /// mm.
     pub diameter_mm: f32,

@@ -1,6 +1,6 @@
 //! Grades of steel, by the names that standards give them.
 
-use super::{Bars, InnerLining, Reinforcement};
+use super::{Bars, InnerLining, Reinforcement, SegmentBars};
 
 /// A grade of reinforcement.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -143,6 +143,14 @@ impl Reinforcement {
             self.bars.iter().filter(meets).map(Bars::area).sum::<f32>()
         };
         self.bars.iter().map(|bars| in_section(bars.span()[0])).fold(0.0, f32::max)
+    }
+}
+
+impl SegmentBars {
+    /// What they are made of.
+    #[must_use]
+    pub fn grade(&self) -> Option<Grade> {
+        Some(Grade::named(&self.steel)?.at(self.f_y_mpa))
     }
 }
 
