@@ -593,6 +593,68 @@ fn hooked_bars_are_drawn_as_they_are_bent() {
     }
 }
 
+/// Two rings of four segments, the second turned and shorter: their steel is drawn along its lines,
+/// each in the segment that it is called after, under its cover at faces and joints.
+#[test]
+fn segments_have_their_steel_inside() {
+    let scene = load(&scene_of(
+        "members: [(id: \"T\", body: Tunnel(radius_m: 2, length_m: 2.5, segments: (count: 4, ring_m: 1.5, thickness_m: 0.3, first_joint_deg: 20, stagger_deg: 45, joint: (gap_mm: 10), \
+            reinforcement: (cover_mm: 35, f_y_mpa: 480, hoops: (diameter_mm: 12, spacing_mm: 150), bars: (count: 9, diameter_mm: 8)))))],",
+    ))
+    .unwrap();
+    let steel = &scene.structure.assemblies[0].steel;
+    // Within 1.41 m (less joint and cover) ten hoops, within .91 m seven.
+    assert_eq!(steel.len(), 4 * 2 * ((10 + 9) + (7 + 9)));
+    let drawn: Vec<_> = scene.objects.iter().filter(|o| o.part != Part::Concrete).collect();
+    assert_eq!(drawn.len(), steel.len());
+    for (line, object) in steel.iter().zip(drawn) {
+        let member = &scene.members[object.member.unwrap()];
+        assert_eq!(object.name, format!("T/{}", line.name));
+        assert!(object.name.starts_with(&format!("{} ", member.id)), "{}", object.name);
+        assert_eq!(line.grade.unwrap().yield_mpa, 480.0);
+        let [ring, segment] = [4, 7].map(|at| member.id[at - 1..at].parse::<f32>().unwrap());
+        let first = 20.0 + 45.0 * (ring - 1.0) + 90.0 * (segment - 1.0);
+        let [from, to] = if ring == 1.0 { [0.0, 1.5] } else { [1.5, 2.5] };
+        let free = 0.035 + 0.5 * line.diameter - 1e-4;
+        for p in line.bent() {
+            let r = p.truncate().length();
+            assert!((2.0 + free..=2.3 - free).contains(&r), "{} at {p}", line.name);
+            let z = (p.z - scene.members[0].frame.start.z).abs();
+            assert!((from + free..=to - free).contains(&z), "{} at {p}", line.name);
+            let turned = (p.y.atan2(p.x).to_degrees() - first).rem_euclid(360.0).to_radians();
+            let room = free - 0.5 * line.diameter;
+            let joint = (r * turned).min(r * (90f32.to_radians() - turned));
+            assert!(joint >= room, "{} at {p}: {joint}", line.name);
+            let off = |q: &glam::Vec3| object.transform.transform_point3(*q).distance(p);
+            let nearest =
+                scene.meshes[object.mesh].positions.iter().map(off).fold(f32::INFINITY, f32::min);
+            assert!(nearest < 0.55 * line.diameter, "{nearest} {}", line.name);
+        }
+    }
+    let thin = load(&scene_of(
+        "members: [(id: \"T\", body: Tunnel(radius_m: 2, length_m: 1, segments: (count: 4, ring_m: 1, thickness_m: 0.1, reinforcement: (cover_mm: 40, hoops: (diameter_mm: 12, spacing_mm: 150)))))],",
+    ));
+    let why = thin.unwrap_err().to_string();
+    assert!(why.contains("segments.reinforcement.cover_mm"), "{why}");
+}
+
+/// A tunnel of segments alone is held and loaded by its own name, and not one of its segments.
+#[test]
+fn a_tunnel_is_held_and_loaded_as_a_whole() {
+    let of = |id: &str| {
+        load(&scene_of(&format!(
+            "members: [(id: \"T\", body: Tunnel(radius_m: 2, length_m: 1, segments: (count: 4, ring_m: 1, thickness_m: 0.2)))], \
+             supports: [(member: \"{id}\", place: Start, hold: Fixed)], \
+             loads: [(name: \"jack\", members: [\"{id}\"], action: SelfWeight)],"
+        )))
+    };
+    of("T").unwrap();
+    let why = of("T/R1/S2").unwrap_err().to_string();
+    assert!(why.contains("supports[0].member") && why.contains("write \"T\""), "{why}");
+    let why = of("T/R2/S2").unwrap_err().to_string();
+    assert!(why.contains("no member has the id"), "{why}");
+}
+
 /// A turned column's meter stands on its turned face.
 #[test]
 fn meters_follow_turned_members() {

@@ -469,7 +469,12 @@ impl List<'_> {
         self.note("left out: B500B");
         let hoops = said.and_then(|r| r.hoops.as_ref());
         let of_hoops = |field| place(&[Named("hoops"), Named(field)]);
-        self.number("diameter of hoops", "mm", hoops.map(|h| h.diameter_mm), of_hoops("diameter_mm"));
+        self.number(
+            "diameter of hoops",
+            "mm",
+            hoops.map(|h| h.diameter_mm),
+            of_hoops("diameter_mm"),
+        );
         self.number("hoops every", "mm", hoops.map(|h| h.spacing_mm), of_hoops("spacing_mm"));
         let bars = said.and_then(|r| r.bars.as_ref());
         let of_bars = |field| place(&[Named("bars"), Named(field)]);

@@ -170,7 +170,7 @@ pub(crate) fn unknown_members<'a>(
     };
     let ids: HashSet<&str> = known.into_iter().collect();
     let mut wrong = Vec::new();
-    let mut refer = |place: String, id: &str| {
+    let refer = |place: String, id: &str, wrong: &mut Vec<Problem>| {
         if wrong.len() < MAX_PROBLEMS && !ids.contains(id) {
             wrong.push(Problem::error(
                 place,
@@ -180,37 +180,56 @@ pub(crate) fn unknown_members<'a>(
         }
     };
     for (i, d) in scene.details.iter().enumerate() {
-        refer(format!("details[{i}].member"), &d.member);
+        refer(format!("details[{i}].member"), &d.member, &mut wrong);
     }
     for (i, m) in scene.meters.iter().enumerate() {
         if let Meter::Surface { on, .. } = m {
-            refer(format!("meters[{i}].on"), on);
+            refer(format!("meters[{i}].on"), on, &mut wrong);
         }
     }
     for (i, s) in scene.scanners.iter().enumerate() {
         s.members
             .iter()
             .enumerate()
-            .for_each(|(j, id)| refer(format!("scanners[{i}].members[{j}]"), id));
-    }
-    for (i, s) in scene.supports.iter().enumerate() {
-        refer(format!("supports[{i}].member"), &s.member);
+            .for_each(|(j, id)| refer(format!("scanners[{i}].members[{j}]"), id, &mut wrong));
     }
     for (i, j) in scene.joints.iter().enumerate() {
-        refer(format!("joints[{i}].of.0"), &j.of.0);
-        refer(format!("joints[{i}].of.1"), &j.of.1);
-    }
-    for (i, l) in scene.loads.iter().enumerate() {
-        l.members
-            .iter()
-            .enumerate()
-            .for_each(|(j, id)| refer(format!("loads[{i}].members[{j}]"), id));
+        refer(format!("joints[{i}].of.0"), &j.of.0, &mut wrong);
+        refer(format!("joints[{i}].of.1"), &j.of.1, &mut wrong);
     }
     for (i, t) in scene.tests.iter().enumerate() {
-        refer(format!("tests[{i}].member"), &t.member);
+        refer(format!("tests[{i}].member"), &t.member, &mut wrong);
     }
+    // A tunnel bears as a whole, whether it has a lining of its name or segments alone.
+    let tunnels = || scene.members.iter().filter(|m| matches!(m.body, Body::Tunnel { .. }));
     for (i, g) in scene.gauges.iter().enumerate() {
-        refer(format!("gauges[{i}].member"), &g.member);
+        if !tunnels().any(|t| t.id == g.member) {
+            refer(format!("gauges[{i}].member"), &g.member, &mut wrong);
+        }
+    }
+    let supports = scene.supports.iter().enumerate();
+    let supports = supports.map(|(i, s)| (format!("supports[{i}].member"), &s.member));
+    let loads = scene.loads.iter().enumerate().flat_map(|(i, l)| {
+        let of = move |(j, id)| (format!("loads[{i}].members[{j}]"), id);
+        l.members.iter().enumerate().map(of)
+    });
+    for (place, id) in supports.chain(loads) {
+        if tunnels().any(|t| t.id == *id) {
+            continue;
+        }
+        let of = tunnels().find(|t| id.strip_prefix(&t.id).is_some_and(|s| s.starts_with("/R")));
+        match of.filter(|_| ids.contains(id.as_str())) {
+            Some(tunnel) if wrong.len() < MAX_PROBLEMS => wrong.push(Problem::error(
+                place,
+                "SEGMENT",
+                format!(
+                    "a tunnel is held and loaded as a whole: write \"{}\"",
+                    shorten(&tunnel.id)
+                ),
+            )),
+            Some(_) => {}
+            None => refer(place, id, &mut wrong),
+        }
     }
     wrong
 }
@@ -255,7 +274,8 @@ impl Body {
                 of_bar(reinforcement, *length_m) + tendons.len() as f32
             }
             Self::Tunnel { length_m, segments, inner_lining, .. } => {
-                let bars = |b: &Option<LiningBars>| b.as_ref().map_or(0.0, |b| 2.0 * b.count as f32);
+                let bars =
+                    |b: &Option<LiningBars>| b.as_ref().map_or(0.0, |b| 2.0 * b.count as f32);
                 let segments = segments.as_ref().map_or(0.0, |s| {
                     let steel = s.reinforcement.as_ref().map_or(0.0, |r| {
                         bars(&r.bars) + 2.0 * stirrups(&r.hoops, s.ring_m.min(*length_m))

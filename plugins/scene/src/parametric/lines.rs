@@ -11,9 +11,7 @@ use super::{
 use crate::{
     Frame, Part,
     file::Member,
-    structure::{
-        Body, Grade, InnerLining, Reinforcement, Section, Segments, SteelLine, Tendon,
-    },
+    structure::{Body, Grade, InnerLining, Reinforcement, Section, Segments, SteelLine, Tendon},
 };
 
 /// All steel of a member.

@@ -379,7 +379,11 @@ impl Builder<'_> {
     /// The meshes of a cage's shapes.
     fn tubes(&mut self, cage: &Cage) -> Vec<usize> {
         let tube = |s: &steel::Shape| {
-            solid::tube(s.line.get(usize::from(s.closed)..).unwrap_or_default(), s.diameter, s.closed)
+            solid::tube(
+                s.line.get(usize::from(s.closed)..).unwrap_or_default(),
+                s.diameter,
+                s.closed,
+            )
         };
         cage.shapes.iter().map(|shape| self.mesh(tube(shape))).collect()
     }

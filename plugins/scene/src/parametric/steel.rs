@@ -408,7 +408,8 @@ impl Cage {
                 let [from, to] = span.map_or([0.0, TAU], |span| within(span, cover / r));
                 let line = arc(r, from, to, 0.0);
                 let places = stirrup_places(h, length, end);
-                let named = |(i, z)| (format!("{side} hoop {}", i + 1), cage.shapes.len(), Vec3::Z * z);
+                let named =
+                    |(i, z)| (format!("{side} hoop {}", i + 1), cage.shapes.len(), Vec3::Z * z);
                 let lines: Vec<_> = places.enumerate().map(named).collect();
                 cage.lines.extend(lines);
                 let closed = span.is_none();
