@@ -649,6 +649,18 @@ fn a_tunnel_is_held_and_loaded_as_a_whole() {
         )))
     };
     of("T").unwrap();
+    let attacked = |steel: &str| {
+        load(&scene_of(&format!(
+            "members: [(id: \"T\", body: Tunnel(radius_m: 2, length_m: 1, segments: (count: 4, ring_m: 1, thickness_m: 0.2{steel})), exposure: (class: \"XC2\", years: 9))], \
+             details: [(member: \"T/R1/S2\", exposure: (class: \"XD2\", years: 9))],"
+        )))
+        .unwrap()
+        .warnings
+    };
+    let said =
+        |warnings: &[String]| warnings.iter().any(|w| w.contains("T/R1/S2") && w.contains("XC2"));
+    assert!(said(&attacked(", reinforcement: (hoops: (diameter_mm: 10, spacing_mm: 200))")));
+    assert!(!said(&attacked("")));
     let why = of("T/R1/S2").unwrap_err().to_string();
     assert!(why.contains("supports[0].member") && why.contains("write \"T\""), "{why}");
     let why = of("T/R2/S2").unwrap_err().to_string();

@@ -35,6 +35,7 @@ pub(crate) fn doubts(scene: &SceneFile) -> Vec<String> {
     doubts.extend(scene.members.iter().filter_map(bars::unused_ends));
     doubts.extend(scene.members.iter().filter_map(no_class));
     doubts.extend(scene.members.iter().filter_map(|member| unheld(scene, member)));
+    doubts.extend(scene.details.iter().filter_map(|detail| unattacked(scene, detail)));
     for load in &scene.loads {
         let bear = |m: &&Member| load.members.is_empty() || load.members.contains(&m.id);
         let factor = load.history.iter().map(|h| h.1.abs()).reduce(f32::max).unwrap_or(1.0);
@@ -81,6 +82,20 @@ fn unheld(scene: &SceneFile, member: &Member) -> Option<String> {
             member.id, member.id
         )
     })
+}
+
+/// A segment with bars of its own and an exposure of its own: the ring is computed under one.
+fn unattacked(scene: &SceneFile, detail: &Detail) -> Option<String> {
+    detail.exposure.as_ref()?;
+    let id = &detail.member;
+    let is_of = |m: &&Member| id.strip_prefix(&m.id).is_some_and(|s| s.starts_with("/R"));
+    let tunnel = scene.members.iter().find(is_of)?;
+    let Body::Tunnel { segments: Some(segments), .. } = &tunnel.body else { return None };
+    segments.reinforcement.as_ref()?;
+    Some(format!(
+        "details of {id}: its bars rust by the exposure of the whole tunnel, {}; its own is not computed",
+        tunnel.exposure.as_ref().map_or("which has none", |e| e.class.as_str())
+    ))
 }
 
 /// An action over what crushes the member's section, A_c f_cm + A_s f_y, whatever its direction:
