@@ -557,18 +557,14 @@ impl SteelPeaks {
     }
 }
 
-/// The part that each steel lies in; all of it is of the `first` that has steel, where no other has.
+/// The part that each steel lies in: the `first` that has steel, but for what lies in another such.
 fn owners(prepared: &Prepared, first: usize) -> Vec<usize> {
-    let steel = &prepared.model.steel;
-    if prepared.parts.iter().filter(|p| p.has_steel).count() == 1 {
-        return vec![first; steel.len()];
-    }
     let mut part_of = vec![first; prepared.model.mesh.hexes.len()];
     for (part, own) in prepared.parts.iter().enumerate().filter(|(_, own)| own.has_steel) {
         own.hexes.iter().for_each(|&hex| part_of[hex as usize] = part);
     }
     let host = |steel: &Steel| steel.pieces.first().map_or(first, |piece| part_of[piece.host]);
-    steel.iter().map(host).collect()
+    prepared.model.steel.iter().map(host).collect()
 }
 
 fn corrosion<'a>(steel: impl Iterator<Item = &'a Steel>, time: f64) -> Option<Corrosion> {

@@ -80,11 +80,9 @@ impl System<'_> {
                 other.iter_mut().for_each(Solver::release);
                 self.assemble_sound(history.time, matrix, job)?;
                 // Five to two dozen solutions of one matrix: a factor pays sooner than for one.
-                match Solver::new(matrix, &constraints, Method::Once, &quiet) {
-                    Ok(made) => own.insert(made),
-                    Err(why @ SolveError::Cancelled(_)) => return Err(why.into()),
-                    Err(_) => return Ok(None),
-                }
+                let made = found(Solver::new(matrix, &constraints, Method::Once, &quiet))?;
+                let Some(made) = made else { return Ok(None) };
+                own.insert(made)
             }
         };
         let geometric = self.geometric(history, points);
@@ -104,12 +102,9 @@ impl System<'_> {
         let (mut basis, mut mu): (Vec<[Vec<f64>; 2]>, f64) = (Vec::new(), 0.0);
         let mut small = DMatrix::zeros(DIRECTIONS, DIRECTIONS);
         for k in 0..DIRECTIONS {
-            let found = match solver.solve(matrix, &load, &constraints, LINEAR, &quiet) {
-                Ok(found) => found,
-                Err(why @ SolveError::Cancelled(_)) => return Err(why.into()),
-                Err(_) => return Ok(None),
-            };
-            let (mut v, mut kv) = (found.x, load);
+            let solved = found(solver.solve(matrix, &load, &constraints, LINEAR, &quiet))?;
+            let Some(solved) = solved else { return Ok(None) };
+            let (mut v, mut kv) = (solved.x, load);
             for [w, kw] in &basis {
                 let share = dot(&v, kw);
                 add(&mut v, -share, w);
@@ -197,6 +192,15 @@ impl System<'_> {
             }
         }
         sum
+    }
+}
+
+/// What a solver found; none: nothing, and nobody stopped it.
+fn found<T>(told: Result<T, SolveError>) -> Result<Option<T>, SolveError> {
+    match told {
+        Ok(found) => Ok(Some(found)),
+        Err(why @ SolveError::Cancelled(_)) => Err(why),
+        Err(_) => Ok(None),
     }
 }
 

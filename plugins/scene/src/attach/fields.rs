@@ -457,15 +457,20 @@ impl List<'_> {
         }
     }
 
+    /// Cover (mm) and grade of bars, whose fields are at `place`.
+    fn covered(&mut self, said: Option<(f32, &str)>, place: impl Fn(&[Step]) -> Vec<Step>) {
+        self.number("cover", "mm", said.map(|s| s.0), place(&[Named("cover_mm")]));
+        let grades = Grade::names().split(", ").map(str::to_owned).collect();
+        let grade = said.map_or(String::new(), |s| s.1.to_owned());
+        self.add("steel", "", FieldKind::OneOf(grades), grade, place(&[Named("steel")]));
+    }
+
     fn segment_bars(&mut self, said: Option<&SegmentBars>, path: &[Step]) {
         self.group("Bars of segments");
         let place = |steps: &[Step]| {
             at(path, &[&[Named("segments"), Named("reinforcement")], steps].concat())
         };
-        self.number("cover", "mm", said.map(|r| r.cover_mm), place(&[Named("cover_mm")]));
-        let grades = Grade::names().split(", ").map(str::to_owned).collect();
-        let grade = said.map_or(String::new(), |r| r.steel.clone());
-        self.add("steel", "", FieldKind::OneOf(grades), grade, place(&[Named("steel")]));
+        self.covered(said.map(|r| (r.cover_mm, r.steel.as_str())), place);
         self.note("left out: B500B");
         let hoops = said.and_then(|r| r.hoops.as_ref());
         let of_hoops = |field| place(&[Named("hoops"), Named(field)]);
@@ -505,10 +510,7 @@ impl List<'_> {
     fn reinforcement(&mut self, said: Option<&Reinforcement>, axis: &Axis, path: &[Step]) {
         self.group("Bars");
         let place = |steps: &[Step]| at(path, steps);
-        self.number("cover", "mm", said.map(|r| r.cover_mm), place(&[Named("cover_mm")]));
-        let grades = Grade::names().split(", ").map(str::to_owned).collect();
-        let grade = said.map_or(String::new(), |r| r.steel.clone());
-        self.add("steel", "", FieldKind::OneOf(grades), grade, place(&[Named("steel")]));
+        self.covered(said.map(|r| (r.cover_mm, r.steel.as_str())), place);
         let Some(said) = said else {
             self.note("left out: B500B");
             let bars = |field| place(&[Named("bars"), Entry(0), Variant("Around"), Named(field)]);

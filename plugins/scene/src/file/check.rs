@@ -217,8 +217,7 @@ pub(crate) fn unknown_members<'a>(
         if tunnels().any(|t| t.id == *id) {
             continue;
         }
-        let of = tunnels().find(|t| id.strip_prefix(&t.id).is_some_and(|s| s.starts_with("/R")));
-        match of.filter(|_| ids.contains(id.as_str())) {
+        match tunnel_of(scene, id).filter(|_| ids.contains(id.as_str())) {
             Some(tunnel) if wrong.len() < MAX_PROBLEMS => wrong.push(Problem::error(
                 place,
                 "SEGMENT",
@@ -232,6 +231,15 @@ pub(crate) fn unknown_members<'a>(
         }
     }
     wrong
+}
+
+/// The tunnel that a segment of this id is of, if it is one.
+pub(super) fn tunnel_of<'a>(scene: &'a SceneFile, id: &str) -> Option<&'a Member> {
+    let is_of = |m: &&Member| {
+        matches!(m.body, Body::Tunnel { .. })
+            && id.strip_prefix(&m.id).is_some_and(|rest| rest.starts_with("/R"))
+    };
+    scene.members.iter().find(is_of)
 }
 
 impl Member {
@@ -1012,17 +1020,23 @@ impl Checker<'_> {
             self.at("reinforcement", |c| {
                 c.cover(r.cover_mm);
                 c.grade(&r.steel, r.f_y_mpa);
-                c.cage(r.cover_mm, r.hoops.as_ref(), r.bars.as_ref(), [s.thickness_m, s.ring_m]);
+                c.cage(
+                    r.cover_mm,
+                    r.hoops.as_ref(),
+                    (1, r.bars.as_ref()),
+                    [s.thickness_m, s.ring_m],
+                );
             });
         }
     }
 
-    /// Hoops and bars at both faces of a shell, of its thickness and length, m.
+    /// Hoops and bars, so many of them at least, at both faces of a shell of this thickness and
+    /// length, m.
     fn cage(
         &mut self,
         cover_mm: f32,
         hoops: Option<&Stirrups>,
-        bars: Option<&LiningBars>,
+        (least, bars): (u32, Option<&LiningBars>),
         [thickness_m, length_m]: [f32; 2],
     ) {
         let mut steel = 0.0;
@@ -1031,7 +1045,7 @@ impl Checker<'_> {
             steel += h.diameter_mm;
         }
         if let Some(b) = bars {
-            self.count("bars.count", b.count, 1, 5000);
+            self.count("bars.count", b.count, least, 5000);
             self.within("bars.diameter_mm", b.diameter_mm, 1.0, 100.0);
             steel += b.diameter_mm;
         }
@@ -1048,7 +1062,7 @@ impl Checker<'_> {
         self.within("thickness_m", l.thickness_m, 0.02, 10.0);
         self.cover(l.cover_mm);
         self.grade(&l.steel, l.f_y_mpa);
-        self.cage(l.cover_mm, l.hoops.as_ref(), l.bars.as_ref(), [l.thickness_m, length_m]);
+        self.cage(l.cover_mm, l.hoops.as_ref(), (3, l.bars.as_ref()), [l.thickness_m, length_m]);
         if let Some(t) = &l.tendons {
             self.at("tendons", |c| {
                 if c.within("spacing_m", t.spacing_m, 0.02, 1000.0)

@@ -88,8 +88,7 @@ fn unheld(scene: &SceneFile, member: &Member) -> Option<String> {
 fn unattacked(scene: &SceneFile, detail: &Detail) -> Option<String> {
     detail.exposure.as_ref()?;
     let id = &detail.member;
-    let is_of = |m: &&Member| id.strip_prefix(&m.id).is_some_and(|s| s.starts_with("/R"));
-    let tunnel = scene.members.iter().find(is_of)?;
+    let tunnel = check::tunnel_of(scene, id)?;
     let Body::Tunnel { segments: Some(segments), .. } = &tunnel.body else { return None };
     segments.reinforcement.as_ref()?;
     Some(format!(

@@ -61,6 +61,11 @@ impl Grade {
         GRADES.map(|g| g.name).join(", ")
     }
 
+    /// The grade of that name, with another yield stress where there is one.
+    fn chosen(name: &str, yield_mpa: Option<f32>) -> Option<Self> {
+        Some(Self::named(name)?.at(yield_mpa))
+    }
+
     /// With a yield stress that was measured or agreed upon.
     #[must_use]
     pub fn at(self, yield_mpa: Option<f32>) -> Self {
@@ -128,7 +133,7 @@ impl Reinforcement {
     /// What its bars are made of; none: a grade that nobody knows, which the checks refuse.
     #[must_use]
     pub fn grade(&self) -> Option<Grade> {
-        Some(Grade::named(&self.steel)?.at(self.f_y_mpa))
+        Grade::chosen(&self.steel, self.f_y_mpa)
     }
 
     /// Area of its longitudinal bars in the section that has most of them, m²; `laps` not counted.
@@ -150,7 +155,7 @@ impl SegmentBars {
     /// What they are made of.
     #[must_use]
     pub fn grade(&self) -> Option<Grade> {
-        Some(Grade::named(&self.steel)?.at(self.f_y_mpa))
+        Grade::chosen(&self.steel, self.f_y_mpa)
     }
 }
 
@@ -158,7 +163,7 @@ impl InnerLining {
     /// What its bars and hoops are made of.
     #[must_use]
     pub fn grade(&self) -> Option<Grade> {
-        Some(Grade::named(&self.steel)?.at(self.f_y_mpa))
+        Grade::chosen(&self.steel, self.f_y_mpa)
     }
 }
 
