@@ -170,13 +170,14 @@ pub struct Step {
 /// What bars do to the cracks that run across them, along each axis; zero without bars.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ties {
-    /// How many cracks a metre their bond makes, 1/m.
+    /// How many cracks a metre their bond makes in what they reach, 1/m.
     pub cracks: [f64; 3],
-    /// What they bear when they yield, over the section of the concrete, Pa.
+    /// What they bear when they yield, over the section of what they reach, Pa.
     pub yielding: [f64; 3],
-    /// What they have left of that before any load, Pa: less where they are stressed.
+    /// What they have left until then before any load, over all of the section, Pa: less where they
+    /// are stressed.
     pub left: [f64; 3],
-    /// Their stiffness, over the same section, Pa.
+    /// Their stiffness, over all of the section, Pa.
     pub stiffness: [f64; 3],
     /// Share of the concrete that they reach.
     pub reached: [f64; 3],

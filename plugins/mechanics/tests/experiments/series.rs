@@ -234,7 +234,10 @@ fn beams_with_stirrups() {
     for beam in BEAMS.iter().filter(|b| only.as_deref().is_none_or(|o| o == b.name)) {
         for half in [false, true] {
             let element = (0.25e-3 * beam.size[0]).min(0.14) * if half { 0.5 } else { 1.0 };
-            let found = strength(&scene(beam), half.then_some(element));
+            let found = match std::env::var("EXPERIMENT_SIZES") {
+                Ok(h) => strength(&scene(beam), Some(h.parse().unwrap())),
+                Err(_) => strength(&scene(beam), half.then_some(element)),
+            };
             ratios.push(beside(beam.name, &found, 2.0, beam.measured, beam.mode));
             let points =
                 found.curve.iter().map(|p| (1e3 * p.displacement_m, 2e-3 * p.load_n)).collect();
