@@ -455,7 +455,8 @@ impl<'a, 'm> Watch<'a, 'm> {
                 if is_along && bar.is_some() && self.yielding.is_none() && work.bar.plastic > 1e-5 {
                     self.yielding = Some((point, steel.name.clone()));
                 }
-                if bar.is_some_and(|bar| work.bar.plastic.abs() > bar.rupture) {
+                // A bar that is pressed so far does not break.
+                if bar.is_some_and(|bar| work.bar.plastic > bar.rupture) {
                     self.broken.get_or_insert((Mode::BarRupture, steel.name.clone()));
                 }
                 if tendon.is_some_and(|t| work.stress >= t.strand.strength) {
@@ -669,13 +670,14 @@ impl<'a, 'm> Watch<'a, 'm> {
     }
 
     /// Σ opening × area of cracks across the axis, oblique and along it that has come from the peak
-    /// to its first fall, m³.
+    /// to its first fall, m³. What is crushed swells every way, which tells of no crack.
     fn opened(&self) -> [f64; 3] {
         let along = self.prepared.direction;
         let mut sums = [0.0; 3];
         for (hex, (before, now)) in self.at_peak.iter().zip(self.failing()).enumerate() {
             let area = (self.structure.model.mesh.hex_volume(hex as u32) / 8.0).powf(2.0 / 3.0);
-            for (before, now) in before.iter().zip(now) {
+            let whole = |point: &Point| past_peak([0.0, point.damage[1]]) <= CRUSHED;
+            for (before, now) in before.iter().zip(now).filter(|(_, now)| whole(now)) {
                 let cosine = glam::DVec3::from_array(now.normal).dot(along).abs().min(1.0);
                 let off = cosine.acos().to_degrees();
                 let class = usize::from(off > OBLIQUE[0]) + usize::from(off > OBLIQUE[1]);
