@@ -303,7 +303,7 @@ mod tests {
                 steel += tie.left[0] / 500e6 * model.mesh.hex_volume(hex as u32);
                 let [cracks, wrong] = [tie.cracks[0], (tie.cracks[0] / expected - 1.0).abs()];
                 assert!(cracks == 0.0 || wrong < allowed, "{h}: {cracks} {expected}");
-                assert!((tie.yielding[0] / 500e6 * 5.4 / 0.016 - cracks).abs() < 1e-9 * expected);
+                assert!((tie.yielding[0] / 500e6 * 5.4 / 0.016 - cracks).abs() < 1e-3 * expected);
             }
             assert!((steel / 2.01e-4 - 1.0).abs() < 1e-9, "{steel}");
         }
@@ -315,6 +315,7 @@ mod tests {
         (lumped.steel[0].area, lumped.steel[0].count) = (3.0 * 2.01e-4, 3.0);
         assert!((ties(&lumped)[0].cracks[0] / (3.0 * expected) - 1.0).abs() < 1e-3);
     }
+
     /// Half of a prism is no thinner than all of it.
     #[test]
     fn concrete_goes_on_beyond_a_plane_of_symmetry() {
