@@ -221,6 +221,21 @@ fn cover_in_metres_and_foreign_classes_are_refused() {
     assert!(load(&column.replace("\"XC3\"", "\"XC4, XD3/XF4\"")).is_ok());
 }
 
+/// A deep beam has bars down its web: how far in a row may lie is up to the measure across its side.
+#[test]
+fn a_row_lies_as_deep_as_its_own_side_allows() {
+    let beam = |side: u32| {
+        problems(&scene_of(&format!(
+            "members: [(id: \"B\", body: Beam(section: Rectangle(width_m: 0.2, depth_m: 0.8), length_m: 4, \
+             reinforcement: (cover_mm: 30, bars: [Row(side_deg: {side}, count: 2, diameter_mm: 12, inset_mm: 350)])))],"
+        )))
+    };
+    assert_eq!(beam(0), Vec::<String>::new());
+    let refused = beam(90);
+    assert_eq!(refused.len(), 1, "{refused:?}");
+    assert!(refused[0].contains("inset_mm") && refused[0].contains("0 to 100"), "{refused:?}");
+}
+
 #[test]
 fn the_schema_is_asked_for() {
     assert!(problems("()")[0].contains("schema"));

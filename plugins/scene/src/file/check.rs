@@ -57,7 +57,7 @@ pub fn check(scene: &SceneFile) -> Vec<Problem> {
             c.at("body", |c| c.body(body));
         }
         // How large and how long it is, only its model knows.
-        c.reinforcement(detail.reinforcement.as_ref(), f32::MAX, None, false);
+        c.reinforcement(detail.reinforcement.as_ref(), [f32::MAX; 2], None, false);
         c.condition(detail.exposure.as_ref(), &detail.slices, &detail.truth);
     });
     c.at("project", |c| c.project(&scene.project));
@@ -723,35 +723,31 @@ impl Checker<'_> {
         match body {
             Body::Column { section, height_m, reinforcement } => {
                 self.above("height_m", *height_m, 0.0, 1000.0);
-                let least = self.section(section);
+                let measures = self.section(section);
                 self.reinforcement(
                     reinforcement.as_ref(),
-                    least,
+                    measures,
                     Some(*height_m),
                     matches!(section, Section::Round { .. }),
                 );
             }
             Body::Beam { section, length_m, reinforcement, tendons } => {
                 self.above("length_m", *length_m, 0.0, 2000.0);
-                let least = self.section(section);
+                let measures = self.section(section);
                 self.reinforcement(
                     reinforcement.as_ref(),
-                    least,
+                    measures,
                     Some(*length_m),
                     matches!(section, Section::Round { .. }),
                 );
-                let half = match *section {
-                    Section::Rectangle { width_m, depth_m } => [depth_m / 2.0, width_m / 2.0],
-                    Section::Round { diameter_m } => [diameter_m / 2.0; 2],
-                };
-                self.tendons(tendons, half);
+                self.tendons(tendons, measures.map(|m| m / 2.0));
             }
             Body::BoxGirder { section: s, length_m, reinforcement, tendons } => {
                 self.above("length_m", *length_m, 0.0, 2000.0);
                 self.at("section", |c| c.box_section(s));
                 self.reinforcement(
                     reinforcement.as_ref(),
-                    s.top_m.min(s.bottom_m).min(s.web_m),
+                    [s.top_m.min(s.bottom_m).min(s.web_m); 2],
                     Some(*length_m),
                     false,
                 );
@@ -808,17 +804,17 @@ impl Checker<'_> {
         }
     }
 
-    /// Checks the section and returns its least measure.
-    fn section(&mut self, section: &Section) -> f32 {
+    /// Checks the section and returns its measures, from side 0 to 180 and from 90 to 270, m.
+    fn section(&mut self, section: &Section) -> [f32; 2] {
         match *section {
             Section::Rectangle { width_m, depth_m } => {
                 self.within("section.width_m", width_m, 0.02, 100.0);
                 self.within("section.depth_m", depth_m, 0.02, 100.0);
-                width_m.min(depth_m)
+                [depth_m, width_m]
             }
             Section::Round { diameter_m } => {
                 self.within("section.diameter_m", diameter_m, 0.02, 100.0);
-                diameter_m
+                [diameter_m; 2]
             }
         }
     }
@@ -842,11 +838,12 @@ impl Checker<'_> {
         }
     }
 
-    /// `least_m`: the smallest measure of its section; `length_m`: of its axis, where it is known.
+    /// `measures`: of its section, from side 0 to 180 and from 90 to 270, m; `length_m`: of its axis,
+    /// where it is known.
     fn reinforcement(
         &mut self,
         r: Option<&Reinforcement>,
-        least_m: f32,
+        measures: [f32; 2],
         length_m: Option<f32>,
         round: bool,
     ) {
@@ -871,7 +868,8 @@ impl Checker<'_> {
                     }
                     Bars::Row { side_deg, count, inset_mm, f_y_mpa, .. } => {
                         c.count("count", count, 1, 1000);
-                        c.within("inset_mm", inset_mm, 0.0, 500.0 * least_m);
+                        let deep = measures[usize::from(side_deg % 180.0 == 90.0)];
+                        c.within("inset_mm", inset_mm, 0.0, 500.0 * deep);
                         c.grade(&r.steel, f_y_mpa);
                         if ![0.0, 90.0, 180.0, 270.0].contains(&side_deg) || round {
                             c.error("side_deg", "RANGE", "a row lies at side 0, 90, 180 or 270 of a section with corners");
@@ -891,7 +889,7 @@ impl Checker<'_> {
                 c.at("stirrups", |c| c.stirrups(s, length_m.unwrap_or(1.0)));
                 stirrup = s.diameter_mm;
             }
-            if 2.0 * (r.cover_mm + stirrup + thickest) > 1000.0 * least_m {
+            if 2.0 * (r.cover_mm + stirrup + thickest) > 1000.0 * measures[0].min(measures[1]) {
                 c.error("cover_mm", "RANGE", "cover, stirrups and bars do not fit into the section: make one of them smaller");
             }
         });
