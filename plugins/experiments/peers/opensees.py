@@ -365,6 +365,11 @@ BEAMS = {
     "A3": (307, 561, 6400, 35.1, 3, 3, 467),
     "B1": (231, 556, 3660, 24.8, 2, 2, 445),
     "B3": (229, 556, 6400, 38.8, 3, 2, 356),
+    "A2": (305, 559, 4570, 24.3, 3, 2, 489),
+    "B2": (229, 561, 4570, 23.2, 2, 2, 400),
+    "C1": (155, 559, 3660, 29.6, 1, 1, 311),
+    "C2": (152, 559, 4570, 23.8, 2, 2, 325),
+    "C3": (155, 554, 6400, 35.1, 2, 2, 269),
 }
 
 
@@ -388,7 +393,7 @@ def series(law):
         area, small, depth = disc(28.7e-3), disc(12.7e-3), 1e-3 * depth
         rows = [(55.95e-3, 2 * small, 345e6), (depth - 126.95e-3, up * area, 555e6), (depth - 63.95e-3, low * area, 555e6)]
         section = Section(1e-3 * width, depth, fcm, [(*row, class_b(row[2])) for row in rows])
-        words = ", in bending (it failed in shear)" if span == 3660 else ""
+        words = ", in bending (it failed in shear)" if name[1] != "3" else ""
         yield from in_the_middle(name, section, 1e-3 * span, measured, words, law)
 
 
