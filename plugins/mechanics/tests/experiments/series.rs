@@ -178,11 +178,15 @@ fn scene(beam: &Beam) -> String {
     let [low, up] = beam.bars;
     let (fcm, spacing) = (beam.strength, beam.spacing);
     let fck = (fcm - 8.0_f64).max(0.6 * fcm);
+    let fctm = match std::env::var_os("EXPERIMENT_STRENGTH") {
+        Some(_) => format!(", fctm_mpa: {}", 1e-6 * tensile_strength(1e6 * fcm)),
+        None => String::new(),
+    };
     let Inside { bars, top, stirrups, cover, inset: [low_by, up_by] } = &beam.inside;
     // Measured from the outside of the stirrups, whose cover puts the lower row where it was.
     format!(
         r#"(schema: "intrados.scene/1", title: "{6}",
-        concretes: [(name: "tested", fck_mpa: {fck}, fcm_mpa: {fcm})],
+        concretes: [(name: "tested", fck_mpa: {fck}, fcm_mpa: {fcm}{fctm})],
         members: [(id: "B", concrete: "tested", at: (0, 0, 0), body: Beam(
             section: Rectangle(width_m: {width}, depth_m: {depth}), length_m: {long},
             reinforcement: (cover_mm: {cover}, bars: [
