@@ -393,6 +393,7 @@ def series(law):
         area, small, depth = disc(28.7e-3), disc(12.7e-3), 1e-3 * depth
         rows = [(55.95e-3, 2 * small, 345e6), (depth - 126.95e-3, up * area, 555e6), (depth - 63.95e-3, low * area, 555e6)]
         section = Section(1e-3 * width, depth, fcm, [(*row, class_b(row[2])) for row in rows])
+        # The third of each width is the longest, and was crushed.
         words = ", in bending (it failed in shear)" if name[1] != "3" else ""
         yield from in_the_middle(name, section, 1e-3 * span, measured, words, law)
 
