@@ -371,11 +371,17 @@ impl<'a, 'm> Watch<'a, 'm> {
 
     fn point(&self, history: &History, residual: f64) -> CurvePoint {
         let load_factor = self.base + history.factor;
-        // What the nodes that are loaded or moved take, along their loads.
+        // What the nodes that are loaded or moved take, each along its load.
         let taken: f64 = self
             .row
-            .iter()
-            .map(|&(n, c, w)| w.signum() * history.force[3 * n as usize + usize::from(c)])
+            .chunk_by(|a, b| a.0 == b.0)
+            .map(|node| {
+                let size = node.iter().map(|(.., w)| w * w).sum::<f64>().sqrt();
+                let force = |&(n, c, w): &(u32, u8, f64)| {
+                    w * history.force[3 * n as usize + usize::from(c)]
+                };
+                node.iter().map(force).sum::<f64>() / size
+            })
             .sum();
         CurvePoint {
             displacement_m: self.displacement(history) - self.begin,
@@ -385,10 +391,16 @@ impl<'a, 'm> Watch<'a, 'm> {
         }
     }
 
+    /// By what the load of a point is judged: its factor, or where displacements are prescribed,
+    /// whose factor only grows, what these take, N.
+    fn bears(&self, point: &CurvePoint) -> f64 {
+        if self.forces > 0.0 { point.load_factor } else { point.load_n }
+    }
+
     /// Whether the load of a point has fallen below a share of the peak, both counted from where
     /// loads began to be raised.
     fn has_fallen(&self, point: &CurvePoint, share: f64) -> bool {
-        let risen = |p: &CurvePoint| p.load_factor - self.curve[0].load_factor;
+        let risen = |p: &CurvePoint| self.bears(p) - self.bears(&self.curve[0]);
         risen(point) < share * risen(&self.curve[self.peak])
     }
 
@@ -421,7 +433,7 @@ impl<'a, 'm> Watch<'a, 'm> {
     fn is_falling(&self) -> bool {
         let last = self.curve.len().saturating_sub(FALLING + 1);
         self.curve.len() > FALLING
-            && self.curve[last..].windows(2).all(|w| w[1].load_factor <= w[0].load_factor)
+            && self.curve[last..].windows(2).all(|w| self.bears(&w[1]) <= self.bears(&w[0]))
     }
 
     fn see(&mut self, history: &History, step: &Step, points: &[[Point; 8]]) {
@@ -435,7 +447,7 @@ impl<'a, 'm> Watch<'a, 'm> {
             step.linear,
             step.avalanche
         );
-        if point.load_factor > self.curve[self.peak].load_factor || self.at_peak.is_empty() {
+        if self.bears(&point) > self.bears(&self.curve[self.peak]) || self.at_peak.is_empty() {
             self.peak = self.curve.len() - 1;
             self.at_peak = points.to_vec();
             self.history_at_peak = Some(history.clone());
@@ -488,7 +500,7 @@ impl<'a, 'm> Watch<'a, 'm> {
         if self.has_fallen(&now, spent) && self.is_falling() && (is_far || !waits) {
             return Some(format!("the load has fallen below {spent} of its peak"));
         }
-        let has_turned = now.load_factor < PASSED * peak.load_factor;
+        let has_turned = self.bears(&now) < PASSED * self.bears(&peak);
         if is_far && has_turned && self.yielding.is_none() && !waits {
             return Some(format!("it has moved {BEYOND} times as far as at its peak"));
         }
@@ -508,7 +520,7 @@ impl<'a, 'm> Watch<'a, 'm> {
     /// How far the next step goes.
     fn next(&self, step: f64, length: f64, stiffness: &mut Option<f64>) -> f64 {
         let [before, now] = [self.curve[self.curve.len() - 2], self.curve[self.curve.len() - 1]];
-        let slope = (now.load_factor - before.load_factor)
+        let slope = (self.bears(&now) - self.bears(&before))
             / (now.displacement_m - before.displacement_m).abs().max(1e-300);
         let moved = now.displacement_m.abs();
         let is_early = moved < EARLY * length;

@@ -399,11 +399,13 @@ fn tensile(stress: &Voigt, fcm: f64) -> f64 {
 /// Strength along a direction over that of concrete without cracks: β = 1/(.8 + .34 ε₁/.002), at
 /// most 1 (Vecchio and Collins 1986, eq. 22, with the strain of .002 at the peak of their panels),
 /// ε₁ being how far cracks are open across it. Strength and the strain at it both count β times, as
-/// in Vecchio and Collins (1993), model A. Cracks count over the brick that they are in: as long as
-/// bricks are no smaller than cracks are apart, that is the mean strain that was measured.
-fn softened(found: &Found, axes: &Frame, along: &[f64; 3]) -> f64 {
+/// in Vecchio and Collins (1993), model A. That is a mean strain, over several cracks
+/// ([`super::law::Band::mean`]).
+fn softened(found: &Found, point: &Point, along: &[f64; 3]) -> f64 {
     let across = |n: &[f64; 3]| 1.0 - (0..3).map(|k| n[k] * along[k]).sum::<f64>().powi(2);
-    let open = (0..3).map(|i| found.cracked.opening[i] * across(&axes[i])).fold(0.0, f64::max);
+    let open = (0..3)
+        .map(|i| point.mean[i] * found.cracked.opening[i] * across(&point.axes[i]))
+        .fold(0.0, f64::max);
     (1.0 / (0.8 + 0.34 * open / 0.002)).min(1.0)
 }
 
@@ -420,6 +422,8 @@ struct Point<'a> {
     change: Voigt,
     laws: [Knee; 3],
     bands: [f64; 3],
+    /// Mean strain of cracks over that in the element.
+    mean: [f64; 3],
     creep: f64,
     /// How much of what bars give back for a while only the step takes away.
     lasting: f64,
@@ -463,7 +467,9 @@ impl Concrete {
             true => before.axes,
             false => before.turned(&effective),
         };
-        let bands = axes.map(|n| step.ties.band(&n, self.along(&n, step), clock.aged.fctm));
+        let shear = self.sheared(&clock);
+        let shared = axes.map(|n| step.ties.band(&n, self.along(&n, step), clock.aged.fctm, shear));
+        let bands = shared.map(|band| band.crack);
         let stretched = match growth {
             Some(_) => before.stretched,
             None => std::array::from_fn(|a| before.stretched[a].max(strain[a])),
@@ -493,6 +499,7 @@ impl Concrete {
             change,
             laws,
             bands,
+            mean: shared.map(|band| band.mean),
             creep,
             lasting: 1.0 - (-(step.to - step.from).max(0.0) / FADING).exp(),
         };
@@ -585,6 +592,12 @@ impl Concrete {
         })
     }
 
+    /// What faces of a crack bear along them once it bears nothing across them, 5 G_f/f_ct wide
+    /// (MC2010 §5.1.8.2), Pa.
+    fn sheared(&self, clock: &Clock) -> f64 {
+        faces(clock).most(5.0 * self.properties.fracture_energy / clock.aged.fctm.max(1.0), 0.0)
+    }
+
     /// How far the element reaches along a direction, m.
     fn along(&self, n: &[f64; 3], step: &Step) -> f64 {
         step.edges.as_ref().map_or(self.setting.size, |edges| reach(edges, n))
@@ -645,15 +658,21 @@ impl Concrete {
         } else {
             self.along(&principal.directions[2], step)
         };
-        let compression =
-            Compression::of(e, clock.aged.fcm, p.peak_strain, p.crushing_energy, band);
+        let compression = Compression::of(
+            e,
+            clock.aged.fcm,
+            p.peak_strain,
+            p.crushing_energy,
+            band,
+            step.together,
+        );
         // Of the stress only what presses crushes; of creep all that goes with it.
         let pressing =
             Principal { values: principal.values.map(|s| s.min(0.0)), ..principal }.as_stress();
         let pressed =
             crushing_stress(tensor::principals(&tensor::add(&pressing, &found.share))) / e;
         let weaker = match self.setting.transverse {
-            true => softened(found, axes, &principal.directions[2]),
+            true => softened(found, point, &principal.directions[2]),
             false => 1.0,
         };
         let pressed = pressed / weaker;
@@ -725,8 +744,14 @@ mod tests {
 
     const E: f64 = 30e9;
     const NU: f64 = 0.2;
-    const NOW: Step =
-        Step { from: 0.0, to: 0.0, temperature: [293.15; 2], edges: None, ties: Ties::NONE };
+    const NOW: Step = Step {
+        from: 0.0,
+        to: 0.0,
+        temperature: [293.15; 2],
+        edges: None,
+        ties: Ties::NONE,
+        together: 1.0,
+    };
 
     fn c30() -> Properties {
         Given { code: Code::Ec2, ..Given::from("C30/37".parse::<Class>().unwrap()) }
@@ -740,7 +765,7 @@ mod tests {
     fn open_cracks_weaken_what_presses_along_them() {
         for transverse in [true, false] {
             let setting =
-                Setting { cracks: Cracks::Planes, transverse, ..Setting::short_term(0.05) };
+                Setting { cracks: Cracks::Planes, transverse, ..Setting::short_term(0.2) };
             // Without Poisson's ratio nothing else confines it.
             let given = Given::from("C30/37".parse::<Class>().unwrap());
             let concrete = Given { poisson: Some(0.0), ..given }.complete().unwrap();

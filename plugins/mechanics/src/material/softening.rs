@@ -106,36 +106,42 @@ impl Held {
     fn stress(&self, kappa: f64, lasted: bool) -> f64 {
         let most = self.most[usize::from(lasted)];
         let bars = || self.left.into_iter().zip(self.square);
-        let [least, largest] = bars()
+        let least = bars()
             .filter(|(_, square)| *square > 0.0)
-            .fold([f64::INFINITY, 0.0], |[least, largest]: [f64; 2], (left, _)| {
-                [least.min(left), largest.max(left)]
-            });
+            .fold(f64::INFINITY, |least: f64, (left, _)| least.min(left));
         if most <= 0.0 || least >= most {
             return most;
         }
         let [interlock, fading] = self.interlock;
         let bears = (interlock / (1.0 + fading * kappa) - self.sheared).max(0.0);
-        // Across the crack and along it, if no bars bear more than a level: the higher it is, the
-        // more shear.
-        let borne = |level: f64| {
-            let [mean, twice] = bars().fold([0.0; 2], |[mean, twice], (left, square)| {
-                let bar = left.min(level);
-                [mean + square * bar, twice + square * bar * bar]
-            });
-            (mean, (twice - mean * mean).max(0.0).sqrt())
-        };
-        let (all, shear) = borne(largest);
-        if shear <= bears {
-            return all.min(most);
-        }
-        let (mut low, mut high) = (least, largest);
-        for _ in 0..LEVELS {
-            let middle = 0.5 * (low + high);
-            if borne(middle).1 <= bears { low = middle } else { high = middle }
-        }
-        borne(low).0.min(most)
+        borne(&self.left, &self.square, bears).min(most)
     }
+}
+
+/// What bars bear across a crack, n² of whose normal along each axis is `square`, if those along
+/// each bear at most `left` and the faces of the crack no more than `shear` along them.
+#[must_use]
+pub(super) fn borne(left: &[f64; 3], square: &[f64; 3], shear: f64) -> f64 {
+    // Across the crack and along it, if no bars bear more than a level: the higher it is, the
+    // more shear.
+    let at = |level: f64| {
+        let bars = left.iter().zip(square);
+        let [mean, twice] = bars.fold([0.0; 2], |[mean, twice], (left, square)| {
+            let bar = left.min(level);
+            [mean + square * bar, twice + square * bar * bar]
+        });
+        (mean, (twice - mean * mean).max(0.0).sqrt())
+    };
+    let (mut low, mut high) = (0.0, left.iter().copied().fold(0.0, f64::max));
+    let all = at(high);
+    if all.1 <= shear {
+        return all.0;
+    }
+    for _ in 0..LEVELS {
+        let middle = 0.5 * (low + high);
+        if at(middle).1 <= shear { low = middle } else { high = middle }
+    }
+    at(low).0
 }
 
 /// Halvings in which the level is found that bars bear.
@@ -225,7 +231,7 @@ pub(crate) struct Compression {
 
 /// Length of the bodies that codes' curves of compression describe past the peak, m (CEB-FIP Model
 /// Code 1990, 2.1.4.4.1).
-pub(super) const GAUGE: f64 = 0.2;
+pub(crate) const GAUGE: f64 = 0.2;
 
 /// Share of the strength up to which compression is elastic.
 pub(super) const ELASTIC: f64 = 0.4;
@@ -240,7 +246,7 @@ impl Compression {
     pub(crate) fn new(e: f64, fc: f64, peak: f64, gc: f64, h: f64) -> Result<Self, Error> {
         let limit = Self::largest(fc, peak, gc);
         match h < limit {
-            true => Ok(Self::of(e, fc, peak, gc, h)),
+            true => Ok(Self::of(e, fc, peak, gc, h, 1.0)),
             false => Err(Error::ElementTooLarge { what: "compression", h, limit }),
         }
     }
@@ -250,9 +256,10 @@ impl Compression {
         2.0 * gc / (fc * peak)
     }
 
-    /// As [`Self::new`], but never an error; see [`Tension::of`].
+    /// As [`Self::new`], but never an error (see [`Tension::of`]), where only a share of [`GAUGE`]
+    /// crushes `together`: its strain is of so much of it.
     #[must_use]
-    pub(crate) fn of(e: f64, fc: f64, peak: f64, gc: f64, h: f64) -> Self {
+    pub(crate) fn of(e: f64, fc: f64, peak: f64, gc: f64, h: f64, together: f64) -> Self {
         let strength = fc / e;
         let peak = peak.max(1.05 * strength);
         let exponent = (peak - ELASTIC * strength) / ((1.0 - ELASTIC) * strength);
@@ -261,7 +268,7 @@ impl Compression {
             peak,
             exponent,
             strength,
-            decay: (gc / (h.max(GAUGE) * fc) - 0.5 * peak).max(0.01 * peak),
+            decay: (gc / (h.max(together * GAUGE) * fc) - 0.5 * peak).max(0.01 * peak),
         }
     }
 
@@ -372,7 +379,10 @@ mod tests {
     #[test]
     fn compression_peaks_at_the_strength_and_keeps_the_crushing_energy() {
         let (e, fc, peak, gc) = (32.8e9, 38e6, 2.16e-3, 35e3);
-        assert_eq!(Compression::of(e, fc, peak, gc, 0.05), Compression::of(e, fc, peak, gc, GAUGE));
+        assert_eq!(
+            Compression::of(e, fc, peak, gc, 0.05, 1.0),
+            Compression::of(e, fc, peak, gc, GAUGE, 1.0)
+        );
         for h in [GAUGE, 0.3] {
             let law = Compression::new(e, fc, peak, gc, h).unwrap();
             let stress = |k: f64| {
@@ -406,7 +416,7 @@ mod tests {
             let e = 22e9 * (0.1 * fcm).powf(0.3);
             let peak = (0.7e-3 * fcm.powf(0.31)).max(1.3e6 * fcm / e);
             let gc = 250.0 * 73.0 * fcm.powf(0.18);
-            let law = Compression::of(e, 1e6 * fcm, peak, gc, 0.06);
+            let law = Compression::of(e, 1e6 * fcm, peak, gc, 0.06, 1.0);
             let ours = |k: f64| (1.0 - law.damage(k).0) * e * k / (1e6 * fcm);
             let first = 0.7e-3 * fcm.powf(0.31);
             let k = 1.05 * e * first / (1e6 * fcm);

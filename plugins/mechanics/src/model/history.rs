@@ -27,6 +27,9 @@ pub struct History {
     /// Of bricks that are damaged the strain of their points that goes on beside what they are
     /// displaced by: that of their modes when they were first damaged.
     pub(crate) softened: BTreeMap<u32, [Voigt; 8]>,
+    /// Of bricks that crush by themselves how much of what lies along their pressure does so with
+    /// them, at most 1.
+    pub(crate) crushing: BTreeMap<u32, f64>,
     /// Displacements in which an element was born, for those that were born after the beginning:
     /// they are its natural shape. By number in the order of elements: bricks first.
     pub born: BTreeMap<u32, [f64; 24]>,

@@ -142,6 +142,8 @@ pub(super) struct Moment {
     pub(super) edges: Edges,
     /// What bars do to the brick's cracks.
     pub(super) ties: Ties,
+    /// How much of what lies along its pressure crushes together with the brick.
+    pub(super) together: f64,
     /// Of the excess of the last equilibrium so much becomes damage, whatever the strain
     /// is now; none: damage is found.
     pub(super) growth: Option<f64>,
@@ -269,6 +271,7 @@ impl Law {
                     temperature: moment.temperature,
                     edges: Some(moment.edges),
                     ties: moment.ties,
+                    together: moment.together,
                 };
                 let grown = moment
                     .growth

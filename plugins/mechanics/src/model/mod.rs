@@ -3,6 +3,7 @@
 
 mod anchor;
 mod anderson;
+mod crushing;
 mod dual;
 mod ground;
 mod history;

@@ -1,6 +1,9 @@
 //! A model made ready to be computed: which unknowns it has, what it resists, what acts on it.
 
-use std::{collections::BTreeMap, sync::Arc};
+use std::{
+    collections::BTreeMap,
+    sync::{Arc, OnceLock},
+};
 
 use glam::DVec3;
 use intrados_stage::Job;
@@ -46,6 +49,8 @@ pub struct System<'m> {
     concrete: Vec<f64>,
     /// What bars do to the cracks of each brick.
     ties: Vec<Ties>,
+    /// What lies at each face of each brick; found when it is asked for.
+    neighbours: OnceLock<Vec<[Option<u32>; 6]>>,
     /// Since when each joint has a brick on both sides, s.
     joined: Vec<f64>,
     pattern: Arc<Pattern>,
@@ -170,6 +175,7 @@ impl<'m> System<'m> {
             pieces,
             concrete,
             ties: ties::ties(model),
+            neighbours: OnceLock::new(),
             joined,
             pattern,
             rotations,
@@ -200,6 +206,7 @@ impl<'m> System<'m> {
                 .collect(),
             born: Default::default(),
             softened: Default::default(),
+            crushing: Default::default(),
             steel: self.model.steel.iter().map(super::Steel::rest).collect(),
             slips: vec![Default::default(); self.model.mesh.interfaces.len()],
             bars: self.resting_bars(),
@@ -215,6 +222,10 @@ impl<'m> System<'m> {
 
     pub(super) fn law(&self, hex: usize) -> &Law {
         &self.laws[self.law_of[hex] as usize]
+    }
+
+    pub(super) fn neighbours(&self) -> &[[Option<u32>; 6]] {
+        self.neighbours.get_or_init(|| self.model.mesh.neighbours())
     }
 
     fn birth(&self, hex: usize) -> f64 {
@@ -517,6 +528,7 @@ impl<'m> System<'m> {
                 softened.insert(e as u32, self.held(e, trial.history, &x, &modes[e])?);
             }
         }
+        let crushing = self.crushing(&points, trial.time);
         let means = self.mean_strains(trial.history, &x);
         let mut steel = trial.history.steel.clone();
         for (bar, works) in steel.iter_mut().enumerate() {
@@ -557,6 +569,7 @@ impl<'m> System<'m> {
             points,
             born,
             softened,
+            crushing,
             steel,
             slips,
             bars,
@@ -688,6 +701,7 @@ impl<'m> System<'m> {
                 neutral,
                 edges,
                 ties: self.ties[hex],
+                together: trial.history.crushing.get(&(hex as u32)).copied().unwrap_or(1.0),
                 growth: trial.growth,
                 nonlocal: nonlocal.map(here),
             };

@@ -114,8 +114,8 @@ fn columns_in_bending_and_shear() {
     for column in COLUMNS.iter().filter(|c| only.as_deref().is_none_or(|o| c.name.contains(o))) {
         // What a user gets: a quarter of the smaller side; half of that beside it.
         let usual = 0.25e-3 * column.section[0].min(column.section[1]);
-        for half in [false, true] {
-            let found = strength(&scene(column), half.then_some(0.5 * usual));
+        for element in super::sizes(&[0.0, 0.5 * usual]) {
+            let found = strength(&scene(column), (element > 0.0).then_some(element));
             for &measured in column.measured {
                 let mode = "shear after bars have yielded";
                 ratios.push(beside(column.name, &found, 1.0, measured, mode));

@@ -183,6 +183,11 @@ fn scene(beam: &Beam) -> String {
         None => String::new(),
     };
     let Inside { bars, top, stirrups, cover, inset: [low_by, up_by] } = &beam.inside;
+    let jack = match std::env::var_os("EXPERIMENT_PLATE") {
+        Some(_) => "Displacement(place: PLACE, displacement_mm: (1e-9, -1, 1e-9))",
+        None => "Force(place: PLACE, force_kn: (0, -50, 0))",
+    };
+    let jack = jack.replace("PLACE", &format!("Surface(from: {plate}, to: 1, side_deg: 0)"));
     // Measured from the outside of the stirrups, whose cover puts the lower row where it was.
     format!(
         r#"(schema: "intrados.scene/1", title: "{6}",
@@ -198,7 +203,7 @@ fn scene(beam: &Beam) -> String {
             (member: "B", place: Surface(from: {support}, to: {support}, side_deg: 180), hold: Directions(x: false, y: true, z: true)),
             (member: "B", place: End, hold: Symmetry),
         ],
-        loads: [(name: "jack", action: Force(place: Surface(from: {plate}, to: 1, side_deg: 0), force_kn: (0, -50, 0)), history: [(28, 0)])],
+        loads: [(name: "jack", action: {jack}, history: [(28, 0)])],
         )"#,
         bars[0], bars[1], top[0], top[1], stirrups[0], stirrups[1], beam.name
     )
