@@ -626,12 +626,17 @@ fn cubes_that_miss_the_volume_are_made_smaller_or_refused() {
 
 /// Half of a beam, its middle at the end of the axis, pressed by a jack near there.
 fn half_beam(loading: &str, bars: u32) -> Prepared {
+    pressed_half_beam("Force(PLACE, force_kn: (0, -10, 0))", loading, bars)
+}
+
+fn pressed_half_beam(action: &str, loading: &str, bars: u32) -> Prepared {
+    let action = action.replace("PLACE", "place: Surface(from: 0.9, to: 1, side_deg: 0)");
     let scene = from_text(&format!(
         "members: [(id: \"B\", at: (0, 0, 0), concrete: \"C30/37\", body: Beam(section: Rectangle(width_m: 0.2, depth_m: 0.4), length_m: 1.1,
                 reinforcement: (cover_mm: 35, bars: [Row(side_deg: 180, count: 2, diameter_mm: {bars})], stirrups: (diameter_mm: 8, spacing_mm: 100))))],
              supports: [(member: \"B\", place: Surface(from: 0.0909, to: 0.0909, side_deg: 180), hold: Directions(x: false, y: true, z: true)),
                 (member: \"B\", place: End, hold: Symmetry)],
-             loads: [(name: \"jack\", action: Force(place: Surface(from: 0.9, to: 1, side_deg: 0), force_kn: (0, -10, 0)), history: [(28, 0)], loading: {loading})]"
+             loads: [(name: \"jack\", action: {action}, history: [(28, 0)], loading: {loading})]"
     ));
     first(&scene, 0.1)
 }
@@ -677,6 +682,14 @@ fn bars_that_bear_less_than_the_concrete_did_hold_nothing() {
     let cracks = 2.9e6 * 0.2 * 0.4_f64.powi(2) / 6.0 / 0.95;
     assert!((1.0..1.6).contains(&(found.peak.load_n / cracks)), "{found:?}");
     assert_eq!(found.mode, Mode::Tearing, "{} {}", found.because, found.ended);
+
+    // Moved instead of loaded, it is seen to fall, too, though what is prescribed only grows.
+    let beam =
+        pressed_half_beam("Displacement(PLACE, displacement_mm: (0, -1, 0))", "Automatic", 6);
+    let life = analyze(&beam, MarchSettings::of_life(), &Job::default(), &mut ()).unwrap().0;
+    let moved = life.strength.unwrap();
+    assert!((0.9..1.2).contains(&(moved.peak.load_n / found.peak.load_n)), "{moved:?}");
+    assert_eq!(moved.mode, Mode::Tearing, "{} {}", moved.because, moved.ended);
 }
 
 /// Cancels a job once it has seen so many equilibria.

@@ -102,7 +102,8 @@ mod tests {
     };
 
     /// A prism of .6 m, one brick of which is a little weaker, pressed until that is crushed: it
-    /// takes the crushing energy, whatever its size.
+    /// takes the crushing energy or, small, four fifths of it, since it does not crush alone from
+    /// the first.
     #[test]
     fn a_brick_that_crushes_alone_takes_the_crushing_energy() {
         let given = Given { fcm: Some(38e6), poisson: Some(0.0), ..Given::default() };
@@ -162,7 +163,9 @@ mod tests {
             let taken = work + 0.5 * most * strength * peak * h;
             println!("{h} m: {most:.3} f_c, {taken:.0} of {energy:.0} N/m, {shortened:.2e} m");
             assert!((most - 0.97).abs() < 0.01, "{h}: {most}");
-            assert!((taken / energy - 1.0).abs() < 0.2, "{h}: {taken} of {energy}");
+            // By the curve of 200 mm it would be h/200 mm of that, .15 in the smallest.
+            let share = taken / energy;
+            assert!((0.7..1.05).contains(&share), "{h}: {taken} of {energy}");
         }
     }
 }

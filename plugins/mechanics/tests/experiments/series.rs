@@ -184,7 +184,7 @@ fn scene(beam: &Beam) -> String {
     };
     let Inside { bars, top, stirrups, cover, inset: [low_by, up_by] } = &beam.inside;
     let jack = match std::env::var_os("EXPERIMENT_PLATE") {
-        Some(_) => "Displacement(place: PLACE, displacement_mm: (1e-9, -1, 1e-9))",
+        Some(_) => "Displacement(place: PLACE, displacement_mm: (0, -1, 0))",
         None => "Force(place: PLACE, force_kn: (0, -50, 0))",
     };
     let jack = jack.replace("PLACE", &format!("Surface(from: {plate}, to: 1, side_deg: 0)"));
