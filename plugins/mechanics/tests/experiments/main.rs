@@ -21,7 +21,8 @@
 //! declared at first; plots of its own),
 //! `EXPERIMENT_BOND=1` (bars slip by the CEB law, anchored at their ends),
 //! `EXPERIMENT_STRENGTH=mean` (f_ct from the mean strength of the cylinders, as if it were
-//! characteristic), `EXPERIMENT_TOLERANCE=.001`. The others write no plots. `EXPERIMENT_TALK=1`
+//! characteristic), `EXPERIMENT_PLATE=1` (beams are moved by a plate that stays flat instead of
+//! pressed evenly), `EXPERIMENT_TOLERANCE=.001`. The others write no plots. `EXPERIMENT_TALK=1`
 //! tells each step.
 //!
 //! A gate that is missed is printed as missed and stays in the plot; the test fails only where a
