@@ -467,7 +467,7 @@ impl Concrete {
             true => before.axes,
             false => before.turned(&effective),
         };
-        let shear = self.sheared(&clock);
+        let shear = self.spent(&clock);
         let shared = axes.map(|n| step.ties.band(&n, self.along(&n, step), clock.aged.fctm, shear));
         let bands = shared.map(|band| band.crack);
         let stretched = match growth {
@@ -594,7 +594,7 @@ impl Concrete {
 
     /// What faces of a crack bear along them once it bears nothing across them, 5 G_f/f_ct wide
     /// (MC2010 §5.1.8.2), Pa.
-    fn sheared(&self, clock: &Clock) -> f64 {
+    fn spent(&self, clock: &Clock) -> f64 {
         faces(clock).most(5.0 * self.properties.fracture_energy / clock.aged.fctm.max(1.0), 0.0)
     }
 
@@ -744,14 +744,7 @@ mod tests {
 
     const E: f64 = 30e9;
     const NU: f64 = 0.2;
-    const NOW: Step = Step {
-        from: 0.0,
-        to: 0.0,
-        temperature: [293.15; 2],
-        edges: None,
-        ties: Ties::NONE,
-        together: 1.0,
-    };
+    const NOW: Step = Step::between(0.0, 0.0);
 
     fn c30() -> Properties {
         Given { code: Code::Ec2, ..Given::from("C30/37".parse::<Class>().unwrap()) }

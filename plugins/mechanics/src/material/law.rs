@@ -264,7 +264,7 @@ impl Step {
     /// A step at 20 °C.
     #[must_use]
     #[cfg(test)]
-    pub(crate) fn between(from: f64, to: f64) -> Self {
+    pub(crate) const fn between(from: f64, to: f64) -> Self {
         Self { from, to, temperature: [293.15; 2], edges: None, ties: Ties::NONE, together: 1.0 }
     }
 }
@@ -748,14 +748,7 @@ mod tests {
         }
     }
 
-    const NOW: Step = Step {
-        from: 0.0,
-        to: 0.0,
-        temperature: [293.15; 2],
-        edges: None,
-        ties: Ties::NONE,
-        together: 1.0,
-    };
+    const NOW: Step = Step::between(0.0, 0.0);
 
     /// The strain at which the stress along x is `stress` and nothing else acts; none if no
     /// equilibrium is found.

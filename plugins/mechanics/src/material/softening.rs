@@ -210,8 +210,8 @@ impl Knee {
 /// size, and in bending all of it crushes together, whatever the mesh. Stretched over its own size
 /// alone, a row of small bricks would bear in the zone of compression what no section bears (mean
 /// stress .81 f_c for C30 and 60 mm, where the code's curve gives .75), and its bars would yield
-/// where the section's do not. The price: where a row of them crushes by itself, less energy is
-/// dissipated than G_c.
+/// where the section's do not. Where a row of them crushes by itself, [`Self::of`] is told so
+/// (`together`), or less energy would be dissipated than G_c.
 ///
 /// The parabola is σ = f_c(1 − .6 ((ε_c1 − κ)/(ε_c1 − ε₀))^p) with p = (E ε_c1 − .4 f_c)/(.6 f_c),
 /// about 2.5.
