@@ -17,6 +17,11 @@ use crate::mesh::{
 /// Bricks that a member is cut into by default, at most about so many.
 const MANY: f64 = 1500.0;
 
+/// Bricks over the depth of a section that is bent, at least. Of four the first points of
+/// integration lie a twentieth of the depth below the edge, while all that is pressed in bending
+/// may be a seventh of it: such a section bears 3 % too much where one of five bears 1.
+const DEEP: f64 = 5.0;
+
 /// Region names of a tunnel.
 pub(super) const LINING: &str = "lining";
 pub(super) const SEGMENTS: &str = "segments";
@@ -33,9 +38,11 @@ impl Draft<'_> {
         let length = self.axes.length;
         let marks: Vec<f64> = self.marks().into_iter().map(|along| along * length).collect();
         let mesh = match &self.member.body {
-            Some(Body::Column { section, .. } | Body::Beam { section, .. }) => {
+            Some(body @ (Body::Column { section, .. } | Body::Beam { section, .. })) => {
                 self.tell_coarseness(section, length, meshing);
-                prism(section, length, &marks, meshing)
+                // Columns may bend any way.
+                let across = if matches!(body, Body::Column { .. }) { DEEP } else { 1.0 };
+                prism(section, length, &marks, meshing, [DEEP, across])
             }
             Some(Body::BoxGirder { section, .. }) => girder(section, length, &marks, meshing),
             Some(Body::Tunnel { .. }) => self.tunnel(length, &marks, meshing),
@@ -319,19 +326,25 @@ fn measures(section: &Section) -> (f64, f64) {
     }
 }
 
+/// A prism of which a rectangular section has at least `least` bricks over its depth and its width,
+/// unless their edge was asked for.
 fn prism(
     section: &Section,
     length: f64,
     marks: &[f64],
     meshing: Meshing,
+    least: [f64; 2],
 ) -> Result<Mesh, MeshError> {
     let (smallest, area) = measures(section);
     let h = edge(meshing, smallest, area, length);
     let plane = match *section {
         Section::Rectangle { width_m, depth_m } => {
-            let side =
-                |measure: f32| divide(-0.5 * f64::from(measure), 0.5 * f64::from(measure), &[], h);
-            Plane::rectangle(&side(depth_m), &side(width_m))?
+            let [depth, width] = [depth_m, width_m].map(f64::from);
+            let side = |measure: f64, least: f64| {
+                let h = meshing.element.unwrap_or(h.min(measure / least));
+                divide(-0.5 * measure, 0.5 * measure, &[], h)
+            };
+            Plane::rectangle(&side(depth, least[0]), &side(width, least[1]))?
         }
         Section::Round { diameter_m } => {
             let diameter = f64::from(diameter_m);
