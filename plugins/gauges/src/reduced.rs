@@ -43,6 +43,9 @@ pub struct Reduced<'r, 's, 'm> {
     /// Vᵀ K V of all concrete, and of every kind of springs among the unknowns.
     concrete: DMatrix<f64>,
     springs: Vec<DMatrix<f64>>,
+    /// Of the energy that concrete takes up in each case (column), sound, how much each of `zones`
+    /// does.
+    shares: DMatrix<f64>,
     grip: Grip,
     /// Tractions under what is held, of the sound structure, one column a member of the basis.
     tractions: DMatrix<f64>,
@@ -152,6 +155,7 @@ impl<'r, 's, 'm> Reduced<'r, 's, 'm> {
             unknowns: unknowns(rig, priors),
             concrete: DMatrix::zeros(0, 0),
             springs: Vec::new(),
+            shares: DMatrix::zeros(0, cases),
             grip: Grip::of(rig),
             tractions: DMatrix::zeros(0, 0),
             compliance: 0.0,
@@ -178,8 +182,18 @@ impl<'r, 's, 'm> Reduced<'r, 's, 'm> {
             DVector::from_column_slice(given) - self.given(&[], 1.0, &self.forces, &self.gauges);
     }
 
+    /// How stiff the concrete is in each case, over what is assumed: its modulus, less what damage
+    /// takes of the energy. What a finer mesh reads more is as much more where that is less; or
+    /// damage of the whole beside a higher modulus would explain errors of the mesh.
+    fn stiff(&self, damage: &[(usize, f64)], modulus: f64) -> DVector<f64> {
+        let all = DVector::from_element(self.shares.ncols(), modulus);
+        damage
+            .iter()
+            .fold(all, |all, &(zone, d)| all - self.shares.row(zone).transpose() * (modulus * d))
+    }
+
     /// What supports add to readings of these fields and importances where they take up as much
-    /// energy as the member. That energy falls as the modulus grows.
+    /// energy as the member. That energy falls as its concrete is stiffer.
     fn given(
         &self,
         damage: &[(usize, f64)],
@@ -192,7 +206,8 @@ impl<'r, 's, 'm> Reduced<'r, 's, 'm> {
         }
         let tractions = self.tractions(damage, modulus);
         let given = (&tractions * lines).tr_mul(&(&tractions * u)) * self.compliance;
-        (DVector::from_column_slice(given.as_slice()) + &self.finer_given) / modulus
+        let given = DVector::from_column_slice(given.as_slice()) + &self.finer_given;
+        by_case(given, &self.stiff(damage, modulus).map(f64::recip))
     }
 
     /// Tractions under what is held as modulus and damage make them: a soft corner bears less.
@@ -247,6 +262,15 @@ impl<'r, 's, 'm> Reduced<'r, 's, 'm> {
         let none = || DMatrix::zeros(basis.len(), basis.len());
         self.concrete =
             self.zones[..self.rig.zones.len()].iter().fold(none(), |sum, zone| sum + &zone.small);
+        let mut shares = DMatrix::zeros(self.zones.len(), cases);
+        for (case, force) in self.forces.column_iter().enumerate() {
+            let energy = |small: &DMatrix<f64>| force.dot(&(small * force));
+            let whole = energy(&self.concrete);
+            for (z, zone) in self.zones.iter().enumerate().filter(|_| whole > 0.0) {
+                shares[(z, case)] = energy(&zone.small) / whole;
+            }
+        }
+        self.shares = shares;
         self.springs = Vec::new();
         for (unknown, _) in &self.unknowns {
             if let &Unknown::Springs(stiffness) = unknown {
@@ -269,6 +293,15 @@ impl<'r, 's, 'm> Reduced<'r, 's, 'm> {
         self.compliance = if all > 0.0 { energy / all } else { 0.0 };
         Ok(())
     }
+}
+
+/// Every case's readings times its factor.
+fn by_case(mut readings: DVector<f64>, factors: &DVector<f64>) -> DVector<f64> {
+    let gauges = (readings.len() / factors.len().max(1)).max(1);
+    for (case, factor) in readings.as_mut_slice().chunks_mut(gauges).zip(factors.iter()) {
+        case.iter_mut().for_each(|r| *r *= factor);
+    }
+    readings
 }
 
 impl Forward for Reduced<'_, '_, '_> {
@@ -312,16 +345,13 @@ impl Forward for Reduced<'_, '_, '_> {
         let (u, lines) = (factor.solve(&self.forces), factor.solve(&self.gauges));
         // By columns: case by case, gauges within.
         let flat = |by: DMatrix<f64>| DVector::from_column_slice(by.as_slice());
-        let loaded = |mut all: DVector<f64>| {
-            all.as_mut_slice()
-                .chunks_mut(gauges.max(1))
-                .zip(&loads)
-                .for_each(|(case, load)| case.iter_mut().for_each(|r| *r *= load));
-            all
-        };
+        let loads = DVector::from_vec(loads);
+        let loaded = |all: DVector<f64>| by_case(all, &loads);
         let by_stiffness = |small: &DMatrix<f64>| flat(lines.tr_mul(&(small * &u)));
         let given = self.given(damage, modulus, &u, &lines);
-        let readings = loaded(flat(self.gauges.tr_mul(&u)) + &self.finer / modulus + &given * give);
+        let soft = self.stiff(damage, modulus).map(f64::recip);
+        let added = by_case(self.finer.clone(), &soft) + &given * give;
+        let readings = loaded(flat(self.gauges.tr_mul(&u)) + &added);
         let mut slopes = DMatrix::zeros(cases * gauges, damage.len() + borders.len() + z.len());
         let width = |border: usize| {
             let is_end = border < FACES || border >= self.rig.zones.len();
@@ -330,7 +360,9 @@ impl Forward for Reduced<'_, '_, '_> {
         let of_zones = damage.iter().map(|d| (d.0, 1.0));
         let of_borders = borders.iter().map(|&b| (self.rig.zones.len() + b, 1.0 / width(b)));
         for (k, (zone, per)) in of_zones.chain(of_borders).enumerate() {
-            slopes.set_column(k, &loaded(by_stiffness(&self.zones[zone].small) * (modulus * per)));
+            let own = by_stiffness(&self.zones[zone].small);
+            let share = self.shares.row(zone).transpose().component_mul(&soft);
+            slopes.set_column(k, &loaded((own + by_case(added.clone(), &share)) * (modulus * per)));
         }
         let mut springs = self.springs.iter().zip(&springs);
         for (k, &(unknown, sd)) in self.unknowns.iter().take(z.len()).enumerate() {
@@ -339,7 +371,7 @@ impl Forward for Reduced<'_, '_, '_> {
                     let left = damage.iter().fold(self.concrete.clone(), |left, &(zone, d)| {
                         left - &self.zones[zone].small * d
                     });
-                    loaded((by_stiffness(&left) * -modulus) - &self.finer / modulus - &given * give)
+                    loaded((by_stiffness(&left) * -modulus) - &added)
                 }
                 Unknown::Load(case) => {
                     let mut own = DVector::zeros(readings.len());

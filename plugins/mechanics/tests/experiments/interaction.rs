@@ -19,6 +19,7 @@ const HARDENS: f64 = 0.08 * YIELD / 0.05;
 /// MPa.
 pub(super) const FCM: f64 = 38.0;
 
+/// Angles about a column begin at +z and go to +x, along which it is pushed.
 fn scene(axial: f64) -> String {
     let long = HALF + BEYOND;
     let support = BEYOND / long;
@@ -28,20 +29,20 @@ fn scene(axial: f64) -> String {
     format!(
         r#"(schema: "intrados.scene/1", title: "N and M",
         concretes: [(name: "tested", fck_mpa: {fck}, fcm_mpa: {FCM})],
-        members: [(id: "C", concrete: "tested", at: (0, 0, 0), body: Beam(
-            section: Rectangle(width_m: {SIDE}, depth_m: {SIDE}), length_m: {long},
+        members: [(id: "C", concrete: "tested", at: (0, 0, 0), body: Column(
+            section: Rectangle(width_m: {SIDE}, depth_m: {SIDE}), height_m: {long},
             reinforcement: (cover_mm: 32, {bond}bars: [
-                Row(side_deg: 0, count: 3, diameter_mm: 20),
-                Row(side_deg: 0, count: 2, diameter_mm: 20, inset_mm: 150),
-                Row(side_deg: 180, count: 3, diameter_mm: 20),
+                Row(side_deg: 270, count: 3, diameter_mm: 20),
+                Row(side_deg: 270, count: 2, diameter_mm: 20, inset_mm: 150),
+                Row(side_deg: 90, count: 3, diameter_mm: 20),
             ], stirrups: (diameter_mm: 8, spacing_mm: 100))))],
         supports: [
-            (member: "C", place: Surface(from: {support}, to: {support}, side_deg: 180), hold: Directions(x: false, y: true, z: true)),
+            (member: "C", place: Surface(from: {support}, to: {support}, side_deg: 90), hold: Directions(x: true, y: false, z: true)),
             (member: "C", place: End, hold: Symmetry),
         ],
         loads: [
-            (name: "axial", action: Force(place: Start, force_kn: ({axial}, 0, 0)), history: [(27.9, 0), (28, 1)]),
-            (name: "jack", action: Force(place: Surface(from: {from}, to: {to}, side_deg: 0), force_kn: (0, -20, 0)), history: [(28, 0)]),
+            (name: "axial", action: Force(place: Start, force_kn: (0, {axial}, 0)), history: [(27.9, 0), (28, 1)]),
+            (name: "jack", action: Force(place: Surface(from: {from}, to: {to}, side_deg: 270), force_kn: (20, 0, 0)), history: [(28, 0)]),
         ])"#
     )
 }
@@ -92,8 +93,8 @@ fn by_fibres(axial: f64) -> f64 {
     (1..600).filter_map(|k| moment(1e-4 * f64::from(k))).fold(0.0, f64::max)
 }
 
-/// How far the middle has sunk below the pressed end at the highest load, m: the end lies beyond
-/// its support and rises, and the force goes with it.
+/// How far the middle has gone from the pressed end at the highest load, m: the end lies beyond
+/// its support and goes the other way, and the force with it.
 #[derive(Default)]
 struct Sag {
     factor: f64,
@@ -111,13 +112,12 @@ impl Observer for Sag {
         if step.factor > self.factor {
             let nodes = &structure.model.mesh.nodes;
             // Of the axis, by the mean of a section's nodes.
-            let rise = |x: f64| {
-                let at = (0..nodes.len()).filter(|&n| (nodes[n].x - x).abs() < 1e-6);
-                let [sum, count] =
-                    at.fold([0.0; 2], |[s, c], n| [s + history.x[3 * n + 1], c + 1.0]);
+            let gone = |y: f64| {
+                let at = (0..nodes.len()).filter(|&n| (nodes[n].y - y).abs() < 1e-6);
+                let [sum, count] = at.fold([0.0; 2], |[s, c], n| [s + history.x[3 * n], c + 1.0]);
                 sum / count
             };
-            (self.factor, self.sag) = (step.factor, rise(0.0) - rise(HALF + BEYOND));
+            (self.factor, self.sag) = (step.factor, gone(HALF + BEYOND) - gone(0.0));
         }
         Ok(())
     }
