@@ -162,7 +162,7 @@ impl Rig {
         // nothing.
         let whole = joined(&testing, &job)?;
         let handed = whole.as_ref().and_then(|whole| whole.handed(&body.id));
-        let prepared = prepare_within(&testing, body, handed, meshing, &job)?;
+        let prepared = prepare_within(&testing, body, handed, meshing.elastic(body), &job)?;
         let notes = prepared.notes;
         let mut model = prepared.model;
         stiffen(&mut model);

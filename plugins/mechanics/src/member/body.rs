@@ -5,10 +5,10 @@ use std::{collections::BTreeMap, f64::consts::PI};
 use glam::DVec3;
 use intrados_scene::{
     MemberKind,
-    structure::{Action, Body, BoxSection, GroundModel, Pipe, Place, Section},
+    structure::{Action, Assembly, Body, BoxSection, GroundModel, Pipe, Place, Section},
 };
 
-use super::{Draft, MemberError, Meshing, Part};
+use super::{Axes, Draft, MemberError, Meshing, Part};
 use crate::mesh::{
     ElementId, Interface, Layer, Mesh, MeshError, Polar, Rings, Shell, divide,
     section::{Girder, Section as Plane},
@@ -306,6 +306,19 @@ fn lay_pipe(mesh: &mut Mesh, pipe: &Pipe) {
 /// Edge of the cubes of an imported member, of which its box is known.
 pub(super) fn cube(meshing: Meshing, size: DVec3, volume: f64) -> f64 {
     edge(meshing, size.min_element(), volume, 1.0)
+}
+
+impl Meshing {
+    /// As it is or, of a beam or a column of which no edge was asked for, a quarter of the smallest
+    /// measure every way: what stays elastic bends exactly on any number of bricks over its depth.
+    #[must_use]
+    pub fn elastic(self, member: &Assembly) -> Self {
+        let Some(Body::Column { section, .. } | Body::Beam { section, .. }) = &member.body else {
+            return self;
+        };
+        let (smallest, area) = measures(section);
+        Self { element: Some(edge(self, smallest, area, Axes::of(&member.frame).length)) }
+    }
 }
 
 /// Edge of elements: what was asked for, or a quarter of the section's smallest measure, coarser

@@ -43,7 +43,8 @@ use crate::{
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Meshing {
     /// Largest edge of an element, m; `None`: a quarter of the smallest measure of the section,
-    /// coarser where there would be very many.
+    /// coarser where there would be very many, but of a beam five over its depth, of a column over
+    /// both sides.
     pub element: Option<f64>,
 }
 
