@@ -405,3 +405,74 @@ impl Forward for Reduced<'_, '_, '_> {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use intrados_mechanics::{member::Meshing, model::System};
+    use intrados_scene::Scene;
+
+    use super::*;
+
+    const PIER: &str = r#"(
+        schema: "intrados.scene/1",
+        members: [(id: "P", concrete: "C30/37", body: Column(
+            section: Rectangle(width_m: 0.5, depth_m: 0.5), height_m: 4,
+            reinforcement: (cover_mm: 40, bars: [Around(count: 8, diameter_mm: 20)], stirrups: (diameter_mm: 10, spacing_mm: 200)),
+        ))],
+        supports: [(member: "P", place: Start, hold: Fixed)],
+        tests: [
+            (name: "truck", member: "P", actions: [Force(place: End, force_kn: (0, -500, 0))]),
+            (name: "rope", member: "P", actions: [Force(place: End, force_kn: (20, 0, 0))]),
+        ],
+        gauges: [
+            (name: "1", member: "P", along: 0.2, angle_deg: 0, measures: Strain(Axial)),
+            (name: "2", member: "P", along: 0.9, angle_deg: 0, measures: Displacement((1, 0, 0))),
+        ],
+    )"#;
+
+    /// A reduced model of a pier whose readings a finer mesh has raised by a tenth.
+    fn with_reduced(test: impl FnOnce(&Reduced)) {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("pier.ron");
+        std::fs::write(&file, PIER).unwrap();
+        let job = Job::default();
+        let scene = Scene::load(&file, &job).unwrap();
+        let rig = Rig::new(&scene, "P", Meshing { element: Some(0.25) }).unwrap().unwrap();
+        let structure = System::new(&rig.model).unwrap();
+        let priors = Priors { modulus: 0.1, give: 0.05, ..Priors::KNOWN };
+        let linear = rig.linear(&structure, &job).unwrap();
+        let mut reduced = Reduced::new(&rig, linear, &priors, &job).unwrap();
+        let own = reduced.read(&[], &[], &[]).unwrap().0;
+        let given = reduced.given(&[], 1.0, &reduced.forces, &reduced.gauges);
+        reduced.correct((&own * 1.1).as_slice(), (given * 1.1).as_slice());
+        let raised = reduced.read(&[], &[], &[]).unwrap().0;
+        assert!((raised / 1.1 - &own).norm() < 1e-9 * own.norm());
+        test(&reduced);
+    }
+
+    /// With what a finer mesh reads more, too; or the two together would explain errors of the mesh.
+    #[test]
+    fn damage_of_the_whole_reads_as_a_lower_modulus() {
+        with_reduced(|reduced| {
+            let lost = 0.2_f64;
+            let whole: Vec<(usize, f64)> = (0..reduced.zones()).map(|z| (z, lost)).collect();
+            let damaged = reduced.read(&whole, &[], &[0.0, 1.0]).unwrap().0;
+            let softer = (1.0 - lost).ln() / 0.1;
+            let softer = reduced.read(&[], &[], &[softer, 1.0]).unwrap().0;
+            assert!((&damaged - &softer).norm() < 1e-9 * softer.norm(), "{damaged} {softer}");
+        });
+    }
+
+    #[test]
+    fn slopes_are_those_of_the_readings() {
+        with_reduced(|reduced| {
+            let at = |d: f64, z: f64| reduced.read(&[(5, d)], &[], &[z, 0.0]).unwrap();
+            let (small, slopes) = (1e-5, at(0.3, 0.5).1);
+            let by_damage = (at(0.3 + small, 0.5).0 - at(0.3 - small, 0.5).0) / (2.0 * small);
+            let by_modulus = (at(0.3, 0.5 + small).0 - at(0.3, 0.5 - small).0) / (2.0 * small);
+            for (k, by) in [by_damage, by_modulus].into_iter().enumerate() {
+                assert!((slopes.column(k) - &by).norm() < 1e-6 * by.norm(), "{k}: {slopes} {by}");
+            }
+        });
+    }
+}

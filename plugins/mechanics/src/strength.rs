@@ -302,6 +302,11 @@ fn resultant(structure: &System, action: &Action, time: f64) -> Result<f64, Fail
     Ok(each.sum::<glam::DVec3>().length())
 }
 
+/// Damage of compression past the peak.
+fn crushing(point: &Point) -> f64 {
+    past_peak([0.0, point.damage[1]])
+}
+
 /// Of a brick's volume what its damage of compression past the peak `is` such, and all of it, m³.
 fn volumes(
     structure: &System,
@@ -310,7 +315,7 @@ fn volumes(
     is: impl Fn(f64) -> bool,
 ) -> [f64; 2] {
     let volume = structure.model.mesh.hex_volume(hex as u32);
-    let such = points.iter().filter(|point| is(past_peak([0.0, point.damage[1]]))).count();
+    let such = points.iter().filter(|point| is(crushing(point))).count();
     [volume * such as f64 / 8.0, volume]
 }
 
@@ -688,7 +693,7 @@ impl<'a, 'm> Watch<'a, 'm> {
         let mut sums = [0.0; 3];
         for (hex, (before, now)) in self.at_peak.iter().zip(self.failing()).enumerate() {
             let area = (self.structure.model.mesh.hex_volume(hex as u32) / 8.0).powf(2.0 / 3.0);
-            let whole = |point: &Point| past_peak([0.0, point.damage[1]]) <= CRUSHED;
+            let whole = |point: &Point| crushing(point) <= CRUSHED;
             for (before, now) in before.iter().zip(now).filter(|(_, now)| whole(now)) {
                 let cosine = glam::DVec3::from_array(now.normal).dot(along).abs().min(1.0);
                 let off = cosine.acos().to_degrees();

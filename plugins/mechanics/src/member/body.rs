@@ -59,8 +59,7 @@ impl Draft<'_> {
 
     /// A note where bricks are larger than would suit the section.
     fn tell_coarseness(&mut self, section: &Section, length: f64, meshing: Meshing) {
-        let (smallest, area) = measures(section);
-        let [suits, h] = [0.25 * smallest, edge(meshing, smallest, area, length)];
+        let [suits, h] = [0.25 * measures(section).0, brick(section, length, meshing)];
         if meshing.element.is_none() && h > suits {
             self.notes.push(format!(
                 "elements of {h:.3} m, where a quarter of the section's smallest measure is {suits:.3} m, to keep to some {MANY} bricks: --element asks for others"
@@ -316,9 +315,14 @@ impl Meshing {
         let Some(Body::Column { section, .. } | Body::Beam { section, .. }) = &member.body else {
             return self;
         };
-        let (smallest, area) = measures(section);
-        Self { element: Some(edge(self, smallest, area, Axes::of(&member.frame).length)) }
+        Self { element: Some(brick(section, Axes::of(&member.frame).length, self)) }
     }
+}
+
+/// Edge of the bricks of a prism, along it.
+fn brick(section: &Section, length: f64, meshing: Meshing) -> f64 {
+    let (smallest, area) = measures(section);
+    edge(meshing, smallest, area, length)
 }
 
 /// Edge of elements: what was asked for, or a quarter of the section's smallest measure, coarser
@@ -348,8 +352,7 @@ fn prism(
     meshing: Meshing,
     least: [f64; 2],
 ) -> Result<Mesh, MeshError> {
-    let (smallest, area) = measures(section);
-    let h = edge(meshing, smallest, area, length);
+    let h = brick(section, length, meshing);
     let plane = match *section {
         Section::Rectangle { width_m, depth_m } => {
             let [depth, width] = [depth_m, width_m].map(f64::from);

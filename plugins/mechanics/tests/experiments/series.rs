@@ -178,10 +178,8 @@ fn scene(beam: &Beam) -> String {
     let [low, up] = beam.bars;
     let (fcm, spacing) = (beam.strength, beam.spacing);
     let fck = (fcm - 8.0_f64).max(0.6 * fcm);
-    let fctm = match std::env::var_os("EXPERIMENT_STRENGTH") {
-        Some(_) => format!(", fctm_mpa: {}", 1e-6 * tensile_strength(1e6 * fcm)),
-        None => String::new(),
-    };
+    let fctm =
+        tried_strength(1e6 * fcm).map(|f| format!(", fctm_mpa: {}", 1e-6 * f)).unwrap_or_default();
     let Inside { bars, top, stirrups, cover, inset: [low_by, up_by] } = &beam.inside;
     let jack = match std::env::var_os("EXPERIMENT_PLATE") {
         Some(_) => "Displacement(place: PLACE, displacement_mm: (0, -1, 0))",

@@ -322,9 +322,9 @@ fn run(
             v if v < 0.005 => tr!("a suitable size"),
             v => format!("{} m", fixed(v, 3)),
         });
-    ui.add(edge).labelled_by(label.id).on_hover_text(tr!(
-        "Largest edge of an element; drag to 0 for a quarter of the section's smallest side"
-    ));
+    ui.add(edge)
+        .labelled_by(label.id)
+        .on_hover_text(tr!("Largest edge of an element; drag to 0 for one that suits the section"));
     if stress.element < 0.005 {
         stress.element = 0.0;
     }
