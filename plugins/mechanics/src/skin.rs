@@ -260,7 +260,7 @@ impl Skin {
             }
             let near = FACES[usize::from(facet.face.face)];
             let here = &points[facet.face.hex as usize];
-            if near.iter().all(|&p| past_peak([0.0, here[p].damage[1]]) > CRUSHED) {
+            if near.iter().all(|&p| here[p].crushing() > CRUSHED) {
                 let (centre, normal) = mesh.face_middle(facet.face);
                 let radius = (normal.length() / std::f64::consts::PI).sqrt() as f32;
                 let outward = normal.normalize_or_zero().as_vec3();

@@ -13,7 +13,7 @@ use crate::{
     member::{Along, Prepared, Raised, Reach},
     model::{
         Action, Control, Drive, Equations, Failure, History, March, MarchSettings, Point,
-        SteelKind, Step, System, past_peak,
+        SteelKind, Step, System,
     },
 };
 
@@ -306,11 +306,6 @@ fn resultant(structure: &System, action: &Action, time: f64) -> Result<f64, Fail
     Ok(each.sum::<glam::DVec3>().length())
 }
 
-/// Damage of compression past the peak.
-fn crushing(point: &Point) -> f64 {
-    past_peak([0.0, point.damage[1]])
-}
-
 /// Of a brick's volume what its damage of compression past the peak `is` such, and all of it, m³.
 fn volumes(
     structure: &System,
@@ -319,7 +314,7 @@ fn volumes(
     is: impl Fn(f64) -> bool,
 ) -> [f64; 2] {
     let volume = structure.model.mesh.hex_volume(hex as u32);
-    let such = points.iter().filter(|point| is(crushing(point))).count();
+    let such = points.iter().filter(|point| is(point.crushing())).count();
     [volume * such as f64 / 8.0, volume]
 }
 
@@ -706,7 +701,7 @@ impl<'a, 'm> Watch<'a, 'm> {
         let mut sums = [0.0; 3];
         for (hex, (before, now)) in self.at_peak.iter().zip(self.failing()).enumerate() {
             let area = (self.structure.model.mesh.hex_volume(hex as u32) / 8.0).powf(2.0 / 3.0);
-            let whole = |point: &Point| crushing(point) <= CRUSHED;
+            let whole = |point: &Point| point.crushing() <= CRUSHED;
             for (before, now) in before.iter().zip(now).filter(|(_, now)| whole(now)) {
                 let cosine = glam::DVec3::from_array(now.normal).dot(along).abs().min(1.0);
                 let off = cosine.acos().to_degrees();

@@ -13,6 +13,7 @@ use super::{
     Action, History, Matter, Model, Regularisation,
     law::{Answer, Law, Memory, Moment},
     march::Failure,
+    past_peak,
     slip::Slips,
     thin::Rotations,
     ties,
@@ -104,6 +105,13 @@ pub struct Point {
     pub crack: f64,
     /// Across which it opens, of length 1.
     pub normal: [f64; 3],
+}
+
+impl Point {
+    /// Damage of compression that is past the peak of its curve.
+    pub(crate) fn crushing(&self) -> f64 {
+        past_peak([0.0, self.damage[1]])
+    }
 }
 
 impl<'m> System<'m> {
