@@ -1,0 +1,49 @@
+//! Files of strangers, as `INTRADOS_DATA/hostile` holds them, read by the program as its user runs
+//! it: each ends in its right value, in a doubt that is said, or in one line that refuses it. One
+//! module a folder; beside each file of the folder stand relatives of our own making, which need no
+//! data.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+mod campaign;
+mod csv;
+mod decoders;
+mod gltf;
+mod ifc_matter;
+mod ifc_shape;
+mod img;
+mod obj;
+mod photo;
+mod sino;
+
+use std::{
+    path::{Path, PathBuf},
+    process::{Command, Output},
+};
+
+/// The program, where there is no screen.
+fn program() -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_intrados"));
+    command.env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY").env_remove("RUST_LOG");
+    command
+}
+
+/// Runs the program to its end.
+#[allow(dead_code, reason = "modules come one by one")]
+fn run(args: &[&str]) -> Output {
+    program().args(args).output().unwrap()
+}
+
+/// A file or folder of `INTRADOS_DATA/hostile`.
+#[allow(dead_code, reason = "modules come one by one")]
+fn hostile(name: &str) -> PathBuf {
+    let data =
+        std::env::var_os("INTRADOS_DATA").expect("INTRADOS_DATA must name the folder of test data");
+    Path::new(&data).join("hostile").join(name)
+}
+
+/// What it says on standard error and whether it succeeded, for messages of failing tests.
+#[allow(dead_code, reason = "modules come one by one")]
+fn said(output: &Output) -> String {
+    format!("{} {}", output.status, String::from_utf8_lossy(&output.stderr))
+}
