@@ -26,6 +26,7 @@ use crate::{
     light_line::LightLine,
     photos::Photos,
     play,
+    plugin::MachineSetup,
     recent::Recent,
     reference::{self, Reference},
     report::Report,
@@ -221,7 +222,10 @@ pub(crate) fn act(world: &mut World) {
 fn carry_out(world: &mut World, action: Action) {
     match action {
         Action::Choose => Dialogs::open(world, Purpose::Open),
-        Action::New => world.resource_mut::<Creation>().begin(),
+        Action::New => {
+            let documents = world.resource::<MachineSetup>().documents.clone();
+            world.resource_mut::<Creation>().begin(documents.unwrap_or_default());
+        }
         Action::ChooseExport => {
             let name = world.resource::<Export>().to.path.clone();
             Dialogs::open(world, Purpose::Save(name));

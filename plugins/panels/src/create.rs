@@ -29,6 +29,8 @@ pub(crate) struct Creation {
     pub(crate) is_open: bool,
     kind: &'static str,
     values: Values,
+    /// Where folders are proposed.
+    documents: PathBuf,
     /// Where it will be; as it was proposed, until somebody types.
     to: Destination,
     proposed: String,
@@ -44,8 +46,9 @@ pub(crate) struct Creation {
 
 impl Creation {
     /// Opens it.
-    pub(crate) fn begin(&mut self) {
-        *self = Self { is_open: true, ..Self::default() };
+    /// Folders are proposed in `documents`.
+    pub(crate) fn begin(&mut self, documents: PathBuf) {
+        *self = Self { is_open: true, documents, ..Self::default() };
         self.choose(Draft::KINDS[0]);
     }
 
@@ -55,8 +58,7 @@ impl Creation {
 
     fn choose(&mut self, kind: &'static str) {
         if self.to.path == self.proposed {
-            let home = dirs::document_dir().or_else(dirs::home_dir).unwrap_or_default();
-            self.proposed = free(&home, kind).display().to_string();
+            self.proposed = free(&self.documents, kind).display().to_string();
             self.to.path.clone_from(&self.proposed);
         }
         (self.kind, self.values) = (kind, Values::default());
@@ -235,6 +237,8 @@ mod tests {
     fn a_structure_gets_a_folder_of_its_own_where_somebody_says() {
         let above = tempfile::tempdir().unwrap();
         let mut creation = Creation::default();
+        creation.begin(above.path().join("documents"));
+        assert_eq!(Path::new(&creation.proposal()), above.path().join("documents/column"));
         creation.to.path = "elsewhere/pier ".into();
         creation.put(above.path());
         assert_eq!(Path::new(&creation.to.path), above.path().join("pier"));

@@ -116,7 +116,11 @@ fn row(
                     term(&verdict.state),
                     plus_minus(damage.value, damage.std_error, "")
                 );
-                ui.label(fixed(damage.value, 2)).on_hover_text(hint);
+                let value = ui.label(fixed(damage.value, 2)).on_hover_text(hint);
+                if latest.is_interim(index) {
+                    value.on_hover_text(interim(latest));
+                    ui.label("…").on_hover_text(interim(latest));
+                }
                 colours::severity(ui, verdict, steps);
             }
             if is_typed {
@@ -155,6 +159,11 @@ fn hint(ui: &mut Ui, member: &Member) {
         member.concrete.clone()
     });
     ui.weak(tr!("Click to select, double-click to look at it"));
+}
+
+/// Says that a number may still change.
+pub(crate) fn interim(latest: &Latest) -> String {
+    tr!("Interim: {} of {} pieces of work are done", latest.pieces.0, latest.pieces.1)
 }
 
 /// How far the prediction is, and how to go on where it was cancelled.

@@ -4,6 +4,7 @@ use std::{path::PathBuf, time::Duration};
 
 use bevy_app::{App, Plugin, Update};
 use bevy_ecs::prelude::*;
+use intrados_report::pdf;
 use intrados_stage::Stage;
 
 use crate::{
@@ -36,6 +37,18 @@ pub struct PanelsPlugin {
     pub dialogs: bool,
     /// What the window speaks until its user chooses.
     pub language: Language,
+    /// Where folders of new structures are proposed; `None`: where the program runs.
+    pub documents: Option<PathBuf>,
+    /// The program that prints reports as PDF; `None`: the window offers none.
+    pub pdf_printer: Option<PathBuf>,
+}
+
+/// What the window takes from the machine that it runs on. All of it comes through
+/// [`PanelsPlugin`], so that a window without such settings looks the same on every machine.
+#[derive(Resource)]
+pub(crate) struct MachineSetup {
+    pub(crate) documents: Option<PathBuf>,
+    pub(crate) pdf_printer: Option<PathBuf>,
 }
 
 impl PanelsPlugin {
@@ -48,7 +61,20 @@ impl PanelsPlugin {
         let [session, views, log] = ["session.json", "views.json", "log.txt"].map(file);
         let language = sys_locale::get_locale().map_or(Language::English, |tag| Language::of(&tag));
         let slice = Some(Duration::from_millis(8));
-        Self { slice, recent, layout, session, log, views, dialogs: true, language }
+        let documents = dirs::document_dir().or_else(dirs::home_dir);
+        let (dialogs, pdf_printer) = (true, pdf::printer());
+        Self {
+            slice,
+            recent,
+            layout,
+            session,
+            log,
+            views,
+            dialogs,
+            language,
+            documents,
+            pdf_printer,
+        }
     }
 }
 
@@ -102,6 +128,10 @@ impl Plugin for PanelsPlugin {
             .init_resource::<saving::Saving>()
             .init_resource::<structure::Structure>()
             .insert_resource(desk)
+            .insert_resource(MachineSetup {
+                documents: self.documents.clone(),
+                pdf_printer: self.pdf_printer.clone(),
+            })
             .insert_resource(intrados_light::plugin::Widening(stress::WIDENING))
             .insert_resource(Refine::new(self.slice))
             .insert_resource(session)

@@ -66,6 +66,11 @@ impl Latest {
             && self.before.get(index).is_some_and(Option::is_some)
     }
 
+    /// Whether what is known of a member may still change: work is to come or was cancelled.
+    pub(crate) fn is_interim(&self, index: usize) -> bool {
+        !self.is_done() && self.member(index).is_some() && !self.is_outdated(index)
+    }
+
     /// Whether all is done.
     #[must_use]
     pub(crate) fn is_done(&self) -> bool {

@@ -420,7 +420,7 @@ fn status(
 fn going(now: &Now, refine: &Refine, there: bool, render: Option<&Render>) -> Vec<Piece> {
     let state = match () {
         () if refine.paused => tr!("⏸ Paused"),
-        () if there => tr!("✔ Target reached"),
+        () if there => tr!("✔ Target of the mean reached"),
         () => tr!("Refining"),
     };
     let mut pieces = vec![Piece::new(RichText::new(state).strong())];
@@ -446,6 +446,12 @@ fn going(now: &Now, refine: &Refine, there: bool, render: Option<&Render>) -> Ve
 /// What is known of the picture. Whether that may be trusted stands first, and is elided last.
 fn known(now: &Now, look: &Look) -> Vec<Piece> {
     let mut pieces = vec![convergence(&now.trust)];
+    if now.pixel_noise().is_finite() {
+        let noise = tr!("pixels ± {}", percent(now.pixel_noise()));
+        pieces.push(Piece::new(noise).hint(tr!(
+            "Relative standard error of a single pixel, about. The mean of all pixels converges long before the picture does."
+        )));
+    }
     if let Some(reading) = now.reading(look.view) {
         let mean = plus_minus(reading.mean, reading.std_error, "W/(m² sr)");
         let mean = Piece::new(tr!("Mean {}", mean)).hint(tr!("Mean luminance of the picture"));
@@ -472,14 +478,14 @@ fn known(now: &Now, look: &Look) -> Vec<Piece> {
 
 fn convergence(trust: &Trust) -> Piece {
     if trust.is_certified() {
-        Piece::new(tr!("✔ Converged")).hint(tr!(
+        Piece::new(tr!("✔ Mean converged")).hint(tr!(
             "No walk dominates, the halves agree, the tail of the scores is light, and the other \
              side has met no light that is missing: the error bar may be trusted"
         ))
     } else if trust.is_settled() {
-        Piece::new(tr!("Converged, not checked")).hint(term(&trust.words()))
+        Piece::new(tr!("Mean converged, not checked")).hint(term(&trust.words()))
     } else {
-        Piece::new(tr!("⚠ Not converged"))
+        Piece::new(tr!("⚠ Mean not converged"))
             .hint(tr!("The error bar may be too small: {}", term(&trust.words())))
     }
 }

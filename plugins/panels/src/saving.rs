@@ -19,7 +19,7 @@ use intrados_stage::{
 
 use crate::{
     Action, Actions, Banners, Latest, Log, album, destination::Destination, export::write_png,
-    lang::term, report, toast::Toasts,
+    lang::term, plugin::MachineSetup, report, toast::Toasts,
 };
 
 /// So long tools are put away for a picture: where the system gives none, they come back.
@@ -191,6 +191,7 @@ pub(crate) fn sheet(
     mut saving: ResMut<Saving>,
     scene: Option<Res<CurrentScene>>,
     latest: Res<Latest>,
+    machine: Res<MachineSetup>,
     mut jobs: ResMut<Jobs>,
     mut actions: ResMut<Actions>,
 ) {
@@ -217,7 +218,7 @@ pub(crate) fn sheet(
     });
     let is_entered = is_entered.inner;
     if is_report {
-        let can = pdf::printer().is_some();
+        let can = machine.pdf_printer.is_some();
         ui.add_enabled_ui(can, |ui| ui.checkbox(&mut saving.with_pdf, tr!("and report.pdf")));
         if !can {
             ui.weak(term(pdf::BY_HAND));
@@ -251,7 +252,7 @@ pub(crate) fn sheet(
                     saving.task = Some(table(path, move || csv, &mut jobs));
                 }
                 (Taken::Report, Some(result)) => {
-                    let with_pdf = saving.with_pdf && pdf::printer().is_some();
+                    let with_pdf = saving.with_pdf && machine.pdf_printer.is_some();
                     saving.task = Some(report::save_report(
                         path,
                         Arc::clone(&scene.0),

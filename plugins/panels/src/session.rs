@@ -1,4 +1,5 @@
-//! What is open and saved nowhere, kept in a file for the case that the program breaks off.
+//! What is open and saved nowhere, kept in a file for the case that the program breaks off, or is
+//! quit before it is saved.
 
 use std::{
     fs::{self, File, TryLockError},
@@ -43,6 +44,17 @@ struct Kept {
     #[serde(default)]
     typed: Vec<Unapplied>,
     photograph: Option<KeptPhotograph>,
+    /// Whether the window was quit; if not, the program broke off.
+    #[serde(default)]
+    is_quit: bool,
+}
+
+impl Kept {
+    /// Whether anything in it was typed or picked and is saved nowhere else.
+    fn has_unsaved(&self) -> bool {
+        let is_filled = self.form.as_ref().is_some_and(Form::is_filled);
+        is_filled || !self.typed.is_empty() || self.photograph.is_some()
+    }
 }
 
 /// A photograph, and picks that are not saved yet: pixel and place.
@@ -63,6 +75,8 @@ pub(crate) struct Session {
     left: Option<Kept>,
     /// What is being opened again.
     coming: Option<Kept>,
+    /// As it is in this frame.
+    now: Option<Kept>,
     written: Option<Kept>,
     last: Option<Instant>,
 }
@@ -91,25 +105,32 @@ impl Session {
 
     /// Keeps what is open now, where that is another thing than before.
     fn keep(&mut self, now: Kept) {
-        let is_soon = self.last.is_some_and(|last| last.elapsed() < EVERY);
-        let Some(file) = self.file.as_ref().filter(|_| !is_soon) else { return };
-        if self.written.as_ref() == Some(&now) || self.left.is_some() || self.coming.is_some() {
+        if self.left.is_some() || self.coming.is_some() {
             return;
         }
+        let is_soon = self.last.is_some_and(|last| last.elapsed() < EVERY);
+        let is_known = self.written.as_ref() == Some(&now);
+        self.now = Some(now.clone());
+        let Some(file) = self.file.as_ref().filter(|_| !is_soon && !is_known) else { return };
         self.last = Some(Instant::now());
         kept::write(file, "the session was", &now);
         self.written = Some(now);
     }
 }
 
-/// A session that ends leaves nothing behind, unless it is a panic that ends it, or nobody has looked
-/// yet at what another has left.
+/// A session that is quit leaves behind what was typed or picked and is saved nowhere, and nothing
+/// else. A panic, and what another session has left that has not been answered, leave the file as it
+/// is.
 impl Drop for Session {
     fn drop(&mut self) {
-        if !std::thread::panicking()
-            && let Some(file) =
-                self.file.as_ref().filter(|_| self.left.is_none() && self.lock.is_some())
-            && file.exists()
+        let is_answered = self.left.is_none() && self.coming.is_none() && self.lock.is_some();
+        let Some(file) = self.file.as_ref().filter(|_| is_answered) else { return };
+        if std::thread::panicking() {
+            return;
+        }
+        if let Some(now) = self.now.take().filter(Kept::has_unsaved) {
+            kept::write(file, "the session was", &Kept { is_quit: true, ..now });
+        } else if file.exists()
             && let Err(error) = fs::remove_file(file)
         {
             tracing::warn!("{} was not removed: {error}", file.display());
@@ -181,16 +202,21 @@ fn of(
         form: form.is_open.then(|| form.clone()),
         typed: properties.unapplied(scene),
         photograph: photos.unsaved().map(|(file, all)| KeptPhotograph { file, picks: picks(all) }),
+        is_quit: false,
     }
 }
 
-/// Offers what a session has left that was not ended.
+/// Offers what a session has left that broke off or was quit before all was saved.
 pub(crate) fn offer(ui: &mut Ui, world: &mut World) {
     let Some(left) = world.resource::<Session>().left.clone() else { return };
     Side::top("session").show(ui, |ui| {
         ui.horizontal_wrapped(|ui| {
-            ui.label(tr!("The last session was not ended: {}.", left.scene.display()));
-            if left.form.is_some() || !left.typed.is_empty() || left.photograph.is_some() {
+            let scene = left.scene.display();
+            ui.label(match left.is_quit {
+                true => tr!("The last session had unsaved edits: {}.", scene),
+                false => tr!("The last session was not ended: {}.", scene),
+            });
+            if left.has_unsaved() {
                 ui.label(tr!("What was filled in there and not saved is kept."));
             }
             let session = &mut *world.resource_mut::<Session>();
@@ -222,11 +248,19 @@ mod tests {
                 file: "a.jpg".into(),
                 picks: vec![([1.5, 2.0], [0.1, 0.2, 0.3])],
             }),
+            is_quit: false,
         }
     }
 
+    /// A session with nothing to save.
+    fn saved(scene: &str) -> Kept {
+        let mut form = Form::default();
+        form.begin("C1", Vec::new());
+        Kept { form: Some(form), photograph: None, ..kept(scene) }
+    }
+
     #[test]
-    fn what_broke_off_is_offered_and_what_was_ended_is_not() {
+    fn what_broke_off_is_offered_and_what_was_saved_is_not() {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("deep/session.json");
         let mut session = Session::read(Some(file.clone()));
@@ -246,10 +280,28 @@ mod tests {
         drop(again);
         let mut again = Session::read(Some(file.clone()));
         assert!(again.left.take().is_some());
-        again.keep(kept("/b/scene.ron"));
+        again.keep(kept("/a/scene.ron"));
+        again.keep(saved("/b/scene.ron"));
         drop(again);
         assert!(!file.exists());
         fs::write(&file, "[{").unwrap();
         assert!(Session::read(Some(file)).left.is_none());
+    }
+
+    /// Ctrl+Q within the half second in which nothing is written keeps the last letter, too.
+    #[test]
+    fn what_was_typed_is_offered_again_after_quitting() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("session.json");
+        let mut session = Session::read(Some(file.clone()));
+        session.keep(saved("/a/scene.ron"));
+        session.keep(kept("/a/scene.ron"));
+        drop(session);
+        let mut again = Session::read(Some(file.clone()));
+        assert_eq!(again.left, Some(Kept { is_quit: true, ..kept("/a/scene.ron") }));
+        // Accepted and quit again before its scene was there: nothing is lost.
+        again.coming = again.left.take();
+        drop(again);
+        assert!(Session::read(Some(file)).left.is_some_and(|left| left.has_unsaved()));
     }
 }

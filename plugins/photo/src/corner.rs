@@ -21,6 +21,9 @@ pub struct Outline {
     /// Corners, m, by their place along the axis and then by their angle about it; of round members
     /// the ends of their rims at 0, 90, 180 and 270 degrees.
     pub corners: Vec<DVec3>,
+    /// Of each corner, the names of the faces that meet there (Front, Right …; of round members the
+    /// angle about the axis) and of the end that it is at: bottom or top, of what lies start or end.
+    pub names: Vec<Vec<String>>,
     /// Edges, m.
     pub edges: Vec<[DVec3; 2]>,
 }
@@ -42,14 +45,29 @@ impl Surface {
         let mut edges: Vec<[usize; 2]> =
             at_edge.iter().filter(|(_, normals)| is_sharp(normals)).map(|(e, _)| *e).collect();
         edges.sort_unstable();
-        let corners = match self.faces.first().map(|face| face.chart) {
-            Some(Chart::Around(radius) | Chart::Inside(radius)) => self.rims(radius),
+        let named = match self.faces.first().map(|face| face.chart) {
+            Some(Chart::Around(radius) | Chart::Inside(radius)) => {
+                let rims = self.rims(radius).into_iter();
+                rims.map(|at| (at, vec![format!("{:.0}°", self.coordinates(at).1)])).collect()
+            }
             _ => {
                 let solid = (0..places.len()).filter(|&i| is_corner(&at_vertex[i]));
-                self.in_order(solid.map(|i| places[i]).collect())
+                self.in_order(solid.map(|i| (places[i], self.faces_at(&at_vertex[i]))).collect())
             }
         };
-        Outline { corners, edges: edges.into_iter().map(|e| e.map(|i| places[i])).collect() }
+        let (corners, mut names): (Vec<DVec3>, Vec<Vec<String>>) = named.into_iter().unzip();
+        for (corner, names) in corners.iter().zip(&mut names) {
+            names.push(self.end_at(*corner).to_owned());
+        }
+        Outline { corners, names, edges: edges.into_iter().map(|e| e.map(|i| places[i])).collect() }
+    }
+
+    /// Names of the flat faces that surfaces with these normals belong to.
+    fn faces_at(&self, normals: &[DVec3]) -> Vec<String> {
+        let is_own = |n: DVec3| normals.iter().any(|normal| normal.dot(n) > SHARP);
+        let own =
+            self.faces.iter().filter(|face| matches!(face.chart, Chart::Flat(n) if is_own(n)));
+        own.map(|face| face.name.clone()).collect()
     }
 
     /// Edges that somebody at `eye` may see as lines, m: sharp ones with a side that looks at him,
@@ -88,8 +106,8 @@ impl Surface {
         (places, triangles)
     }
 
-    fn in_order(&self, mut corners: Vec<DVec3>) -> Vec<DVec3> {
-        let key = |p: &DVec3| {
+    fn in_order(&self, mut corners: Vec<(DVec3, Vec<String>)>) -> Vec<(DVec3, Vec<String>)> {
+        let key = |(p, _): &(DVec3, Vec<String>)| {
             let (along, angle) = self.coordinates(*p);
             ((1e3 * along).round() as i64, (10.0 * angle).round() as i64 % 3600)
         };

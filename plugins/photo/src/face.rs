@@ -82,6 +82,9 @@ pub(crate) struct Spot {
 /// Share of squared cosines between normals and radii from which a member is round: of a polygon of
 /// sixteen sides it is .987, of one of eight .95.
 const ROUND: f64 = 0.97;
+/// Cosine between the axis of what stands and the upright, beyond which its ends are a bottom and a
+/// top.
+const UPRIGHT: f64 = 0.7;
 /// Cosine between a flat face's normal and that of what belongs to it.
 const OWN: f64 = 0.7;
 
@@ -119,6 +122,17 @@ impl Surface {
         let p = place - self.start;
         let angle = p.dot(self.ninety).atan2(p.dot(self.zero)).to_degrees().rem_euclid(360.0);
         (p.dot(self.axis) / self.length, angle)
+    }
+
+    /// The end of the member that a place is nearer to, as people call it.
+    pub(crate) fn end_at(&self, place: DVec3) -> &'static str {
+        let is_far = self.coordinates(place).0 > 0.5;
+        match (self.axis.y.abs() > UPRIGHT, is_far, is_far == (self.axis.y > 0.0)) {
+            (true, _, true) => "top",
+            (true, _, false) => "bottom",
+            (false, false, _) => "start",
+            (false, true, _) => "end",
+        }
     }
 
     /// Unit tangents of a surface with this normal: around the axis to the right as one stands

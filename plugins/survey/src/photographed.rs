@@ -126,6 +126,9 @@ pub struct FaceSeen {
     pub seen: f64,
     /// The narrowest crack that would have been found, mm.
     pub narrowest_mm: Option<f64>,
+    /// Width of the widest long dark shape that was read as nothing, mm.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unread_mm: Option<f64>,
 }
 
 impl FaceSeen {
@@ -140,8 +143,10 @@ impl FaceSeen {
     /// ```
     /// use intrados_survey::photographed::FaceSeen;
     ///
-    /// let front = FaceSeen { face: "Front".into(), seen: 0.93, narrowest_mm: Some(0.24) };
-    /// let back = FaceSeen { face: "Back".into(), seen: 0.0, narrowest_mm: None };
+    /// let of = |face: &str, seen, narrowest_mm| {
+    ///     FaceSeen { face: face.into(), seen, narrowest_mm, unread_mm: None }
+    /// };
+    /// let [front, back] = [of("Front", 0.93, Some(0.24)), of("Back", 0.0, None)];
     /// assert_eq!(FaceSeen::told(&[front, back]), "Photographs show 93 % of Front (cracks from 0.24 mm), nothing of Back: what is there is unknown.");
     /// ```
     #[must_use]
@@ -154,6 +159,10 @@ impl FaceSeen {
         let hidden: Vec<&str> =
             faces.iter().filter(|f| !f.is_seen()).map(|f| f.face.as_str()).collect();
         let mut told: Vec<String> = seen.collect();
+        told.extend(faces.iter().filter_map(|f| {
+            let mm = f.unread_mm?;
+            Some(format!("something dark on {}, {mm:.1} mm wide, that was not read", f.face))
+        }));
         if !hidden.is_empty() {
             told.push(format!("nothing of {}: what is there is unknown", hidden.join(", ")));
         }
@@ -169,8 +178,14 @@ impl Shown {
         // Two photographs of a face may show the same of it: it counts what the better one shows.
         for face in more.faces {
             match self.faces.iter_mut().find(|known| known.face == face.face) {
-                Some(known) if known.seen >= face.seen => {}
-                Some(known) => *known = face,
+                Some(known) => {
+                    let unread_mm =
+                        known.unread_mm.into_iter().chain(face.unread_mm).reduce(f64::max);
+                    if known.seen < face.seen {
+                        *known = face;
+                    }
+                    known.unread_mm = unread_mm;
+                }
                 None => self.faces.push(face),
             }
         }
@@ -295,6 +310,7 @@ fn seen_of(face: &Face, read: &[ReadFace]) -> FaceSeen {
         face: face.name.clone(),
         seen: (seen / (width * height).max(1e-9)).clamp(0.0, 1.0),
         narrowest_mm: of_it().filter_map(|r| r.reading.narrowest_mm).reduce(f64::max),
+        unread_mm: of_it().flat_map(|r| &r.reading.unread).map(|u| u.width_mm).reduce(f64::max),
     }
 }
 

@@ -681,7 +681,8 @@ fn nothing_is_claimed_of_an_error_that_nobody_knows() {
     });
     window.frame();
     let claims = |window: &Window| {
-        ["✔ Converged", "✔ Target reached"].map(|t| window.harness.query_by_label(t).is_some())
+        ["✔ Mean converged", "✔ Target of the mean reached"]
+            .map(|t| window.harness.query_by_label(t).is_some())
     };
     assert!(now.samples_per_pixel < 2.0 && !there, "{now:?}");
     assert!(now.trust.complaint.contains("fewer than two samples"), "{:?}", now.trust);
@@ -1329,7 +1330,11 @@ fn a_photograph_is_placed_by_its_corners_and_becomes_evidence() {
     let pose = Pose::of(&camera);
     let picks = |window: &Window| window.harness.query_all_by_label("✖").count();
     let pick = |window: &mut Window, k: usize, corner: glam::DVec3| {
-        window.click(&format!("Corner {}", k + 1));
+        let row = window.harness.get_by(|node| {
+            node.label().is_some_and(|label| label.starts_with(&format!("{} · ", k + 1)))
+        });
+        row.click();
+        window.frames(2);
         let rect = window.harness.get_by_label("Photograph").rect();
         let scale = f64::from(rect.width().min(rect.height())) / 400.0;
         let [u, v] = pose.project(corner).unwrap();

@@ -509,7 +509,8 @@ fn left(mut window: Window, file: &Path, text: &str) -> Vec<u8> {
         String::from_utf8_lossy(&kept).contains(text)
     });
     drop(window);
-    assert!(!file.exists(), "a session that was ended leaves nothing behind");
+    let after = fs::read_to_string(file).expect("what is typed outlives quitting");
+    assert!(after.contains(text) && after.contains("\"is_quit\": true"), "{after}");
     kept
 }
 

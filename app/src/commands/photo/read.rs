@@ -6,7 +6,7 @@ use glam::Vec3;
 use intrados_photo::{
     Located, Photograph,
     marks::{Mark, marks},
-    reading::{Defect, FaceReading, ReadFace, read_all},
+    reading::{Defect, FaceReading, ReadFace, UnreadShape, read_all},
     relight::Relit,
 };
 use intrados_raster::{Grid, Mask};
@@ -252,7 +252,7 @@ impl Report {
 pub(super) fn lines(faces: &[FaceRead]) -> String {
     let mut text = String::new();
     for face in faces {
-        let FaceReading { defects, seen_m2, narrowest_mm, .. } = &face.reading;
+        let FaceReading { defects, seen_m2, narrowest_mm, unread, .. } = &face.reading;
         let narrowest = narrowest_mm.map_or("unknown width".into(), |mm| format!("{mm:.2} mm"));
         text += &format!(
             "{} {}: {:.2} m² read, cracks show from {narrowest}\n",
@@ -260,6 +260,13 @@ pub(super) fn lines(faces: &[FaceRead]) -> String {
             face.face,
             seen_m2.iter().sum::<f64>(),
         );
+        for UnreadShape { patch, width_mm, .. } in unread {
+            let [low, high] = patch.reach_m;
+            text += &format!(
+                "  not read: something dark, {width_mm:.1} mm wide, {low:.2} to {high:.2} m along: \
+                 look whether it is a crack\n"
+            );
+        }
         for defect in defects {
             let [low, high] = defect.reach_m();
             let what = match defect {

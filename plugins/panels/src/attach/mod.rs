@@ -121,6 +121,17 @@ impl Form {
         *self = Self { is_open: true, member: member.into(), sort, files, ..Self::default() };
     }
 
+    /// Whether anything has been filled in since it was opened.
+    pub(crate) fn is_filled(&self) -> bool {
+        let opened = Self {
+            is_open: self.is_open,
+            member: self.member.clone(),
+            sort: self.sort,
+            ..Self::default()
+        };
+        *self != opened
+    }
+
     /// Says where on the member it is, as somebody has shown it there.
     pub(crate) fn put_at(&mut self, along: f32, face: Option<Face>) {
         self.from = fixed(along, 3);

@@ -11,7 +11,7 @@ use std::{path::PathBuf, sync::Arc};
 use bevy_ecs::prelude::*;
 use egui::{ComboBox, Rect, ScrollArea, TextureHandle, TextureOptions, Ui, pos2, vec2};
 use glam::DVec3;
-use intrados_photo::{ByEdges, Located, Pick};
+use intrados_photo::{ByEdges, Located, Pick, corner::Outline};
 use intrados_scene::{Member, Scene, plugin::CurrentScene, structure::Photographed};
 use intrados_stage::{Jobs, Task};
 use model::Turn;
@@ -573,7 +573,17 @@ fn finds(
     for (k, (face, _)) in shot.faces.iter().enumerate() {
         let known = fixed(100.0 * face.known, 0);
         ui.strong(term(&face.name)).on_hover_text(tr!("{} % of its map is known", known));
-        if face.finds.is_empty() {
+        for shape in &face.unread {
+            let [low, high] = shape.patch.reach_m.map(|x| fixed(x, 2));
+            let width = fixed(shape.width_mm, 1);
+            ui.label(tr!(
+                "⚠ not read: something dark, {} mm wide, {} to {} m along. Look whether it is a crack.",
+                width,
+                low,
+                high
+            ));
+        }
+        if face.finds.is_empty() && face.unread.is_empty() {
             let limit = face.narrowest_mm;
             ui.weak(match limit {
                 Some(mm) => {
@@ -607,6 +617,14 @@ fn finds(
     }
 }
 
+/// What a corner is called: its number, the faces that meet there, and its end of the member. A
+/// square column looks alike from all sides, so that numbers alone are picked a quarter turn off.
+fn corner_name(outline: &Outline, corner: usize) -> String {
+    let words = outline.names.get(corner).into_iter().flatten();
+    let words: Vec<String> = words.map(|word| term(word)).collect();
+    format!("{} · {}", corner + 1, words.join(" · "))
+}
+
 /// A row for each corner, with its pick if it has one.
 fn corners(ui: &mut Ui, shot: &mut Shot, armed: &mut Option<usize>) {
     let residual = |k: usize| {
@@ -617,7 +635,7 @@ fn corners(ui: &mut Ui, shot: &mut Shot, armed: &mut Option<usize>) {
     egui::Grid::new("photo corners").num_columns(3).striped(true).show(ui, |ui| {
         for (k, place) in shot.opened.outline.corners.iter().enumerate() {
             let is_armed = *armed == Some(k);
-            let row = ui.selectable_label(is_armed, tr!("Corner {}", k + 1));
+            let row = ui.selectable_label(is_armed, corner_name(&shot.opened.outline, k));
             if row.on_hover_text(point(*place, 3)).clicked() {
                 *armed = (!is_armed).then_some(k);
             }

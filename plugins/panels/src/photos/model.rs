@@ -4,7 +4,7 @@ use egui::{Color32, Rect, Sense, Ui, pos2, vec2};
 use glam::{DMat3, DVec3};
 use intrados_photo::corner::Outline;
 
-use crate::colours;
+use crate::{colours, lang::term};
 
 /// A click so many points beside a corner still means it.
 const REACH: f32 = 12.0;
@@ -78,10 +78,35 @@ pub(super) fn show(
         let place = at + 11.0 * if out.is_finite() { out } else { vec2(1.0, 0.0) };
         painter.text(place, egui::Align2::CENTER_CENTER, k + 1, font.clone(), colour);
     }
+    for (name, middle) in face_middles(outline) {
+        // Those that are turned away would be read through those before them.
+        if flat(middle).z > 0.0 {
+            let colour = ui.visuals().weak_text_color();
+            painter.text(at(middle), egui::Align2::CENTER_CENTER, term(name), font.clone(), colour);
+        }
+    }
     let clicked = response.clicked().then(|| response.interact_pointer_pos()).flatten()?;
     let near = |k: &usize| at(outline.corners[*k]).distance(clicked);
     let nearest = (0..outline.corners.len()).min_by(|a, b| near(a).total_cmp(&near(b)))?;
     (near(&nearest) < REACH).then_some(nearest)
+}
+
+/// Names of the flat faces and the middles of their corners, m.
+fn face_middles(outline: &Outline) -> Vec<(&str, DVec3)> {
+    let mut names: Vec<&str> = Vec::new();
+    // The last word of a corner's name is its end.
+    for name in outline.names.iter().flat_map(|words| words.split_last()).flat_map(|(_, f)| f) {
+        if !name.ends_with('°') && !names.contains(&name.as_str()) {
+            names.push(name);
+        }
+    }
+    let middle = |name: &str| {
+        let is_own = |words: &[String]| words.iter().any(|word| word == name);
+        let own = outline.corners.iter().zip(&outline.names).filter(|(_, words)| is_own(words));
+        let (sum, n) = own.fold((DVec3::ZERO, 0.0), |(sum, n), (at, _)| (sum + *at, n + 1.0));
+        sum / n
+    };
+    names.into_iter().map(|name| (name, middle(name))).collect()
 }
 
 /// What was picked.

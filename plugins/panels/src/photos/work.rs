@@ -11,7 +11,7 @@ use intrados_photo::{
     map::FaceMap,
     overlay::Overlay,
     picture::srgb,
-    reading::{Defect, ReadFace},
+    reading::{Defect, ReadFace, UnreadShape},
 };
 use intrados_scene::{
     Scene,
@@ -71,6 +71,7 @@ pub(super) struct Face {
     /// Share of the map that is known.
     pub(super) known: f64,
     pub(super) narrowest_mm: Option<f64>,
+    pub(super) unread: Vec<UnreadShape>,
     pub(super) finds: Vec<Find>,
 }
 
@@ -193,6 +194,7 @@ fn shown(surface: &Surface, face: &ReadFace, located: &Located) -> Face {
         mm_px: map.mm_px,
         known: map.known(),
         narrowest_mm: face.reading.narrowest_mm,
+        unread: face.reading.unread.clone(),
         finds: face.reading.defects.iter().map(find).collect(),
     }
 }

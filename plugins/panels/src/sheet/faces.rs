@@ -45,6 +45,10 @@ fn photographed(faces: &[FaceSeen]) -> String {
         }
     };
     let mut told: Vec<String> = seen.iter().map(share).collect();
+    told.extend(faces.iter().filter_map(|f| {
+        let mm = fixed(f.unread_mm?, 1);
+        Some(tr!("something dark on {}, {} mm wide, that was not read", term(&f.face), mm))
+    }));
     if !hidden.is_empty() {
         let faces: Vec<String> = hidden.iter().map(|f| term(&f.face)).collect();
         told.push(tr!("nothing of {}: what is there is unknown", faces.join(", ")));
@@ -193,14 +197,22 @@ mod tests {
     /// The command line has its own sentence, in English: nothing of it may be missing here.
     #[test]
     fn photographs_are_said_as_the_command_line_says_them() {
-        let of =
-            |face: &str, seen, narrowest_mm| FaceSeen { face: face.into(), seen, narrowest_mm };
-        let faces = [of("Front", 0.93, Some(0.24)), of("Left", 0.5, None), of("Back", 0.0, None)];
+        let of = |face: &str, seen, narrowest_mm, unread_mm| FaceSeen {
+            face: face.into(),
+            seen,
+            narrowest_mm,
+            unread_mm,
+        };
+        let faces = [
+            of("Front", 0.93, Some(0.24), None),
+            of("Left", 0.5, None, Some(7.25)),
+            of("Back", 0.0, None, None),
+        ];
         assert_eq!(photographed(&faces), FaceSeen::told(&faces));
         speak(Language::German);
         let said = photographed(&faces);
         speak(Language::English);
-        for part in ["93 %", "Vorderseite", "0,24 mm", "50 %", "Rückseite"] {
+        for part in ["7,2 mm", "93 %", "Vorderseite", "0,24 mm", "50 %", "Rückseite"] {
             assert!(said.contains(part), "{part}: {said}");
         }
         assert!(!said.contains("cracks") && !said.contains("nothing"), "{said}");

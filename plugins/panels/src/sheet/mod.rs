@@ -23,6 +23,7 @@ use crate::{
     Action, Actions, Latest, Selection, colours,
     history::History,
     lang::{fixed, measured, term},
+    members,
     moment::{Course, Courses, Moment},
     number::{copied, plus_minus},
 };
@@ -118,6 +119,9 @@ fn standing(ui: &mut Ui, index: usize, latest: &Latest, actions: &mut Actions) {
     };
     if latest.is_outdated(index) {
         outdated(ui, latest, actions);
+    }
+    if latest.is_interim(index) {
+        ui.colored_label(ui.visuals().warn_fg_color, members::interim(latest));
     }
     let damage = plus_minus(predicted.damage.value, predicted.damage.std_error, "");
     copied(ui, RichText::new(format!("d = {}", damage.trim())).size(18.0).strong());

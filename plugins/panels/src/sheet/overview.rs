@@ -3,7 +3,7 @@
 use egui::{RichText, Ui};
 use intrados_scene::Scene;
 
-use crate::{Action, Actions, Latest, colours, lang::term, number::plus_minus};
+use crate::{Action, Actions, Latest, colours, lang::term, members, number::plus_minus};
 
 /// So many of the worst members are named.
 const WORST: usize = 8;
@@ -22,6 +22,9 @@ pub(super) fn overview(ui: &mut Ui, scene: &Scene, latest: &Latest, actions: &mu
         count => tr!("{} members", count),
     });
     ui.add_space(4.0);
+    if (0..scene.members.len()).any(|i| latest.is_interim(i)) {
+        ui.colored_label(ui.visuals().warn_fg_color, members::interim(latest));
+    }
     let known: Vec<usize> =
         (0..scene.members.len()).filter(|i| latest.member(*i).is_some()).collect();
     states(ui, scene, latest, known.len());

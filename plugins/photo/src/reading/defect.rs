@@ -72,6 +72,18 @@ pub enum Defect {
     Efflorescence(Patch),
 }
 
+/// A long dark shape that was read as nothing.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct UnreadShape {
+    /// Where, and how large.
+    #[serde(flatten)]
+    pub patch: Patch,
+    /// Its width at its widest, mm.
+    pub width_mm: f64,
+    /// Its area over that width, m.
+    pub length_m: f64,
+}
+
 impl Defect {
     /// Its kind, for people.
     #[must_use]

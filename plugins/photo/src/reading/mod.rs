@@ -2,6 +2,7 @@
 //! what would have been seen there, had it been there.
 
 mod course;
+mod dark;
 mod defect;
 mod returned;
 mod width;
@@ -21,10 +22,11 @@ use crate::{
     site::SeenFace,
 };
 use course::{Line, lines};
+use dark::{DarkShape, unread_shapes};
 use returned::{Opened, USUAL, returned};
 use width::{FOUND, Piece, SHOWS, Slots, pieces, scatter};
 
-pub use defect::{Crack, CrackPoint, Defect, Patch};
+pub use defect::{Crack, CrackPoint, Defect, Patch, UnreadShape};
 
 /// Parts of the axis by which it is told what was seen.
 pub(crate) const PARTS: usize = 10;
@@ -50,6 +52,9 @@ pub struct FaceReading {
     /// The narrowest crack that takes away eight standard errors of light over 16 pixels of its
     /// length, mm: of narrower ones nothing is said. None where too little is seen to tell.
     pub narrowest_mm: Option<f64>,
+    /// Long dark shapes that were read as nothing: cracks too wide for the network, joints, shadows.
+    /// Nothing is said of the tenths of the axis that they lie in.
+    pub unread: Vec<UnreadShape>,
     /// Millimetres a pixel of the map that was read.
     pub mm_px: f64,
 }
@@ -155,7 +160,19 @@ pub fn read(
     defects.extend(face.patches(&marks));
     let mm_px = map.face.mm_px;
     let narrowest_mm = scatter.map(|s| FOUND * s * mm_px / (1.0 - USUAL[0]));
-    Ok(FaceReading { defects, seen_m2: face.seen(&known), narrowest_mm, mm_px })
+    let shapes = unread_shapes(&value, &known, &read_mask(&marks));
+    let unread: Vec<UnreadShape> = shapes.iter().map(|shape| face.unread(shape)).collect();
+    let seen_m2 = face.vouched(&known, &unread);
+    Ok(FaceReading { defects, seen_m2, narrowest_mm, unread, mm_px })
+}
+
+/// Where anything was read that may be dark.
+fn read_mask(marks: &Marks) -> Mask {
+    let mut read = marks.cracks();
+    for mark in [Mark::Spall, Mark::Steel, Mark::Rust] {
+        read.unite(&marks.areas(mark));
+    }
+    read
 }
 
 /// Lines of which enough light is missing, with their pieces.
@@ -326,6 +343,30 @@ impl Face<'_> {
             reach_m,
             area_m2: pixels.len() as f64 * pixel * pixel,
         }
+    }
+
+    fn unread(&self, shape: &DarkShape) -> UnreadShape {
+        let mm_px = self.map.face.mm_px;
+        UnreadShape {
+            patch: self.patch(&shape.pixels),
+            width_mm: shape.width * mm_px,
+            length_m: 1e-3 * shape.length * mm_px,
+        }
+    }
+
+    /// m² that are known, by tenth of the axis; none where something dark was not read.
+    fn vouched(&self, known: &Mask, unread: &[UnreadShape]) -> [f64; PARTS] {
+        let mut seen = self.seen(known);
+        let length = self.surface.map_or(0.0, Surface::length);
+        for shape in unread {
+            let [low, high] = shape.patch.reach_m.map(|along| along / length * PARTS as f64);
+            for (part, seen) in seen.iter_mut().enumerate() {
+                if (part as f64) < high && (part + 1) as f64 > low {
+                    *seen = 0.0;
+                }
+            }
+        }
+        seen
     }
 
     /// m² that are known, by tenth of the axis.
