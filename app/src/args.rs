@@ -12,6 +12,7 @@ use intrados_mechanics::read::Units;
 use intrados_scene::{
     AxisRuns,
     attach::{Along, Face, Kind, VoxelType},
+    import::KindByName,
     structure::{Course, Date, Electrode},
 };
 use intrados_transport::{Estimator, Roulette, Steering};
@@ -320,6 +321,36 @@ pub(crate) struct Import {
     /// What people, goods and traffic weigh on slabs in the long run, kN/m²; nothing if absent
     #[arg(long, value_name = "KN_M2", value_parser = imposed)]
     pub(crate) imposed: Option<f32>,
+    /// What elements of that name (or GlobalId) are: column, beam, slab, wall, footing, lining,
+    /// pipe, other, or none; again for others
+    #[arg(long = "kind", value_name = "NAME=KIND", value_parser = kind_by_name)]
+    pub(crate) kinds: Vec<KindByName>,
+}
+
+/// `Überbau=slab`.
+fn kind_by_name(text: &str) -> Result<KindByName, String> {
+    use intrados_scene::MemberKind as K;
+    let (name, kind) = text
+        .rsplit_once('=')
+        .filter(|(name, _)| !name.trim().is_empty())
+        .ok_or("give NAME=KIND, such as \"Deck 1=slab\"")?;
+    let kind = match kind.trim() {
+        "column" => Some(K::Column),
+        "beam" => Some(K::Beam),
+        "slab" => Some(K::Slab),
+        "wall" => Some(K::Wall),
+        "footing" => Some(K::Footing),
+        "lining" => Some(K::Lining),
+        "pipe" => Some(K::Pipe),
+        "other" => Some(K::Other),
+        "none" => None,
+        other => {
+            return Err(format!(
+                "{other} is none of column, beam, slab, wall, footing, lining, pipe, other, none"
+            ));
+        }
+    };
+    Ok(KindByName { name: name.into(), kind })
 }
 
 /// Storage halls carry some tens of kN/m².
