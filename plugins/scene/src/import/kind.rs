@@ -485,11 +485,13 @@ fn by_name(element: &Element, bears: bool, solid: Option<&Box3>) -> Option<Membe
             Word::Spans => spanning(solid),
         })
     };
+    // Of the segments of an arch only their shape tells more.
+    let is_segment = own().any(|name| words(name).any(|word| begins(&word, "segment")));
     let above = || element.above.iter().take(2).map(|a| &a.name).find_map(told);
     predefined
         .map(|(_, kind)| *kind)
         .or_else(|| own().find_map(told))
-        .or_else(|| if bears { above() } else { None })
+        .or_else(|| if bears && !is_segment { above() } else { None })
 }
 
 /// What spans is a slab from five times its depth in width on (EN 1992-1-1, 5.3.1), else a beam.
