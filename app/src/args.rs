@@ -107,7 +107,7 @@ pub(crate) enum Command {
     New(New),
     /// Makes a project folder of a structure's model: IFC, glTF or OBJ
     #[command(
-        after_help = "Examples:\n  intrados import bridge.ifc --year 1974 --exposure \"XC4, XD3\"\n  intrados import tunnel.glb --out tunnel\n\nThe folder holds scene.ron (which every other command takes as it is), the geometry, evidence.ron and a README that says what was assumed by which rule.\nIFC is read by IfcOpenShell: pip install ifcopenshell==0.9.0.post1. INTRADOS_PYTHON names the Python that has it; python3 if unset."
+        after_help = "Examples:\n  intrados import bridge.ifc --year 1974 --exposure \"XC4, XD3\"\n  intrados import tunnel.glb --out tunnel\n\nThe folder holds scene.ron (which every other command takes as it is), the geometry, evidence.ron and a README that says what was assumed by which rule.\nIFC is read by IfcOpenShell: pip install ifcopenshell==0.9.0.post1. INTRADOS_PYTHON names the Python that has it; python3 if unset. An element that takes it longer than 60 s (INTRADOS_IFC_SECONDS) is left out and named."
     )]
     Import(Import),
     /// Puts evidence beside a scene: CT slices, a table (CSV), a load test, or a single finding

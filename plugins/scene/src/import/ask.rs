@@ -84,7 +84,7 @@ fn layers(found: &[&Idle], what: &str, remark: &str) -> Option<String> {
     let names = found.iter().map(|i| format!("\"{}\"", i.name)).collect::<Vec<_>>();
     (volume > 0.0).then(|| {
         format!(
-            "{volume:.2} m³ of {what} ({}) are no member: {remark}; --kind \"NAME=slab\" makes a member of one",
+            "{volume:.2} m³ of {what} ({}) are no member: {remark}; if one is, say --kind \"NAME=slab\"",
             listed(&names)
         )
     })

@@ -169,15 +169,11 @@ fn copies(pieces: &[Piece], gone: &BTreeSet<usize>, notes: &mut Vec<String>) -> 
         cells.entry(cell).or_default().push(k);
     }
     if !twice.is_empty() {
-        notes.push(format!(
-            "{} lie twice at one place and count once ({})",
-            if twice.len() == 1 {
-                "a member's body".into()
-            } else {
-                format!("bodies of {} members", twice.len())
-            },
-            listed(&twice)
-        ));
+        let what = match twice.len() {
+            1 => "a member lies twice at one place and counts once".to_owned(),
+            n => format!("{n} members lie twice at one place and count once"),
+        };
+        notes.push(format!("{what} ({})", listed(&twice)));
     }
     if !near.is_empty() {
         notes.push(format!(
