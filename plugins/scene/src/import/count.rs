@@ -216,3 +216,73 @@ pub(super) fn listed(names: &[String]) -> String {
     };
     names.iter().take(3).cloned().collect::<Vec<_>>().join(", ") + &more
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        MemberKind,
+        import::source::{Above, Element},
+        parametric::solid,
+    };
+
+    /// A box of a width, length and height whose lowest corner lies at a place.
+    fn piece(id: &str, class: &str, above: &str, at: [f64; 3], size: [f32; 3]) -> Piece {
+        let [x, y, z] = size;
+        let mesh = solid::cells(&[0.0, x], &[0.0, y], |_, _| true, z);
+        let low = mesh.positions.iter().fold(glam::Vec3::INFINITY, |l, p| l.min(*p));
+        let points = mesh.positions.iter().map(|p| (*p - low).as_dvec3() + DVec3::from(at));
+        let surface = Surface { points: points.collect(), triangles: mesh.triangles.clone() };
+        let of = Above { class: String::new(), name: String::new(), id: above.into() };
+        let element = Element {
+            id: id.into(),
+            name: id.into(),
+            class: class.into(),
+            above: vec![of],
+            surface,
+            ..Element::default()
+        };
+        let verdict = Verdict::Member(MemberKind::Beam, By::Class);
+        Piece { element, verdict, tube: None, segments: Vec::new() }
+    }
+
+    fn left(pieces: Vec<Piece>) -> (Vec<String>, Vec<String>) {
+        let mut notes = Vec::new();
+        let kept = once(pieces, &mut notes);
+        (kept.into_iter().map(|p| p.element.id).collect(), notes)
+    }
+
+    #[test]
+    fn a_whole_counts_and_its_parts_do_not() {
+        let part = |id, z| piece(id, "IfcBuildingElementPart", "w", [0.0, 0.0, z], [0.4, 0.6, 4.0]);
+        let whole = |class| piece("w", class, "", [0.0; 3], [0.4, 0.6, 8.0]);
+        let (kept, notes) = left(vec![whole("IfcBeam"), part("a", 0.0), part("b", 4.0)]);
+        assert_eq!(kept, ["w"]);
+        assert!(notes[0].contains("\"w\" of 2"), "{notes:?}");
+        // What stands for its parts goes; what lies outside of its whole stays.
+        let parts = [part("a", 0.0), part("b", 4.0), part("c", 8.0)];
+        let all = std::iter::once(whole("IfcElementAssembly")).chain(parts).collect();
+        assert_eq!(left(all).0, ["a", "b", "c"]);
+        let (kept, _) = left(vec![whole("IfcBeam"), part("c", 8.0)]);
+        assert_eq!(kept, ["w", "c"]);
+    }
+
+    /// A step apart each time: the same, nearly the same, two.
+    #[test]
+    fn what_lies_at_one_place_counts_once() {
+        for (step, count, doubts) in [(0.0, 1, 1), (0.002, 1, 1), (0.02, 2, 1), (0.5, 2, 0)] {
+            let pieces = [0.0, step].map(|x| piece("c", "IfcColumn", "", [x, 0.0, 0.0], [0.4; 3]));
+            let (kept, notes) = left(pieces.into());
+            assert_eq!((kept.len(), notes.len()), (count, doubts), "{step}: {notes:?}");
+        }
+        // A wedge and the wedge that makes a box of it are two.
+        let mut pieces = [0.0, 0.0].map(|x| piece("w", "IfcBeam", "", [x; 3], [0.4; 3]));
+        for (k, piece) in pieces.iter_mut().enumerate() {
+            for p in &mut piece.element.surface.points {
+                let slope = if k == 0 { p.x } else { 0.4 - p.x };
+                p.y = if p.y > 0.2 { slope } else { p.y };
+            }
+        }
+        assert_eq!(left(pieces.into()).0.len(), 2);
+    }
+}
