@@ -305,6 +305,24 @@ fn the_body_alone_counts_with_data() {
     });
 }
 
+/// A library or a second project in metres beside a project in millimetres.
+#[test]
+#[ignore = "with_data: by IfcOpenShell"]
+fn units_are_those_of_the_project_with_data() {
+    for class in ["IFCPROJECTLIBRARY", "IFCPROJECT"] {
+        let mut model = Model::new("IFC4");
+        model.body("IFCCOLUMN", "C", [0.0; 3], [400.0, 400.0, 4000.0]);
+        let metre = model.put("IFCSIUNIT(*,.LENGTHUNIT.,$,.METRE.)");
+        let units = model.put(&format!("IFCUNITASSIGNMENT((#{metre}))"));
+        model.put(&format!("{class}('1aMCGGH$T1kwlezcysLrdZ',$,'other',$,$,$,$,(#8),#{units})"));
+        let text = model.text().replacen(".LENGTHUNIT.,$", ".LENGTHUNIT.,.MILLI.", 1);
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("model.ifc");
+        fs::write(&path, text).unwrap();
+        check(&path, &[], &only(COLUMN));
+    }
+}
+
 #[test]
 #[ignore = "with_data: by IfcOpenShell"]
 fn what_is_drawn_twice_counts_once_with_data() {

@@ -592,6 +592,14 @@ def shapes_of(model, bodies, path, most, hear, progress):
             queue[:0] = [rest[i:i + size] for i in range(0, len(rest), size)]
 
 
+def forget_libraries(model):
+    """Takes libraries and second projects out, in memory: IfcOpenShell knows no unit beside them, and
+    millimetres would be metres."""
+    projects = [p for p in instances(model, "IfcProject") if getattr(p, "UnitsInContext", None)]
+    for other in instances(model, "IfcProjectLibrary") + projects[1:]:
+        model.remove(other)
+
+
 def main(path, folder, most=60.0):
     bound_to_parent()
     try:
@@ -600,6 +608,7 @@ def main(path, folder, most=60.0):
         fault("damaged", error)
     if not model.by_type("IfcProject"):
         fault("damaged", "there is no IfcProject in it")
+    forget_libraries(model)
     units, scale, area = length_units(model)
     if not scale or not scale > 0:
         fault("units")
