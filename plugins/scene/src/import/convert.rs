@@ -83,6 +83,9 @@ struct Told {
     /// Why there is none.
     #[serde(default)]
     reason: String,
+    /// What is wrong with all else that the file says of it.
+    #[serde(default)]
+    damaged: String,
 }
 
 #[derive(Debug, Deserialize)]
@@ -322,6 +325,12 @@ fn source(answer: Answer, shapes: &[u8]) -> Result<Source, String> {
         ));
     }
     let missing = bodiless(&answer.elements);
+    let damaged: Vec<String> = (answer.elements.iter().filter(|e| !e.damaged.is_empty()))
+        .map(|e| {
+            let name = crate::file::shorten(&e.name);
+            format!("{} \"{name}\": its properties are damaged ({}): left out", e.class, e.damaged)
+        })
+        .collect();
     let elements: Result<Vec<Element>, String> =
         answer.elements.into_iter().map(|told| element(told, shapes)).collect();
     let mut elements = elements?;
@@ -334,6 +343,7 @@ fn source(answer: Answer, shapes: &[u8]) -> Result<Source, String> {
     }
     notes.extend(missing.into_iter().map(|m| format!("{m}: left out, and its load is missing")));
     notes.extend(elements.iter_mut().filter_map(|e| e.twice.take()));
+    notes.extend(damaged);
     let unit = answer.units.first().cloned().unwrap_or_default();
     let scale = answer.metres_per_unit;
     let georeference = georeference::resolve(answer.georeference, scale, &mut notes);

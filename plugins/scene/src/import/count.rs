@@ -52,7 +52,8 @@ fn parts(pieces: &[Piece], notes: &mut Vec<String>) -> BTreeSet<usize> {
         .collect();
     let mut of: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
     for (i, piece) in pieces.iter().enumerate().filter(|(_, p)| is_member(p)) {
-        let above = piece.element.above.iter().filter_map(|a| known.get(a.id.as_str()));
+        let named = piece.element.above.iter().filter(|a| !a.id.is_empty());
+        let above = named.filter_map(|a| known.get(a.id.as_str()));
         above.filter(|w| **w != i).for_each(|w| of.entry(*w).or_default().push(i));
     }
     let (mut gone, mut wholes, mut assemblies) = (BTreeSet::new(), Vec::new(), Vec::new());

@@ -51,6 +51,7 @@ if version < OLDEST:
     fault("old", ifcopenshell.version)
 try:
     import ifcopenshell.geom as geom
+    import ifcopenshell.guid
     import ifcopenshell.util.element as about
     import ifcopenshell.util.placement as placement
     import numpy
@@ -167,7 +168,7 @@ def above(element):
             here = None
         if here is None:
             break
-        told.append({"class": here.is_a(), "name": here.Name or "", "id": here.GlobalId})
+        told.append({"class": here.is_a(), "name": here.Name or "", "id": here.GlobalId or ""})
     return told
 
 
@@ -211,6 +212,23 @@ def said(element, scale, area):
         "items": "",
         "reason": "",
     }
+
+
+def said_of(element, scale, area):
+    """The same of any element: what is damaged in it is left out, and a GlobalId that is missing is
+    an empty one."""
+    try:
+        told = said(element, scale, area)
+    except Exception as error:
+        told = {
+            "step": element.id(), "class": element.is_a(), "name": str(element.Name or ""),
+            "object_type": "", "predefined": "", "type": "", "above": above(element),
+            "properties": {}, "materials": [], "attributes": {}, "courses": [], "shapes": [],
+            "items": "", "reason": "", "id": None,
+            "damaged": shortened(error),
+        }
+    told["id"] = element.GlobalId or ""
+    return told
 
 
 def length_units(model):
@@ -503,6 +521,10 @@ def is_orphan():
         return False
 
 
+# What has hardly worked for so long, s, waits for ever.
+IDLE = 15.0
+
+
 class Isolated:
     """A process that makes shapes, and the pipe on which it tells of them."""
 
@@ -518,17 +540,23 @@ class Isolated:
             os._exit(0)
         os.close(out)
         self.back, self.rest, self.begin = back, b"", time.monotonic()
+        self.worked, self.moved, self.stuck = -1.0, self.begin, False
 
     def work(self):
-        """How long it has worked, s: on a busy machine a clock would blame the innocent. A tenth of
-        the clock where the system does not say it, and where that is more: what waits for ever."""
-        waited = 0.1 * (time.monotonic() - self.begin)
+        """How long it has worked, s: on a busy machine a clock would blame the innocent. The clock,
+        where the system does not say it."""
+        now = time.monotonic()
         try:
             with open(f"/proc/{self.pid}/stat", encoding="latin-1") as file:
                 numbers = file.read().rsplit(")", 1)[1].split()
-            return max((int(numbers[11]) + int(numbers[12])) / os.sysconf("SC_CLK_TCK"), waited)
+            work = (int(numbers[11]) + int(numbers[12])) / os.sysconf("SC_CLK_TCK")
         except (OSError, ValueError, IndexError):
-            return 10 * waited
+            return now - self.begin
+        if self.worked < 0 or now - self.moved > IDLE:
+            # A hundredth of the time is what waiting itself takes.
+            self.stuck = self.worked >= 0 and work - self.worked < 0.01 * (now - self.moved)
+            self.worked, self.moved = work, now
+        return work
 
     def lines(self, seconds):
         """What it tells within so many seconds; none when it has ended."""
@@ -554,8 +582,12 @@ def shapes_of(model, bodies, path, most, hear, progress):
     """All shapes. A process that breaks or says nothing in `most` seconds of work is replaced: what it
     left is tried in ever smaller parts, until the element is alone that is to blame."""
     open(path, "wb").close()
-    if not hasattr(os, "fork"):
-        make_shapes(model, bodies, path, 0, lambda **words: hear(words))
+    if not hasattr(os, "fork"):  # All in this process: a bad element costs the others here.
+        def tell(**words):
+            if "step" in words:
+                hear(words)
+            progress()
+        make_shapes(model, bodies, path, 0, tell)
         return
     queue, blamed = [bodies] if bodies else [], 0
     while queue:
@@ -576,7 +608,7 @@ def shapes_of(model, bodies, path, most, hear, progress):
                         left.pop(words["step"], None)
                         hear(words)
                 ended = lines is None
-                is_late = not ended and process.work() - heard > most_work
+                is_late = not ended and (process.work() - heard > most_work or process.stuck)
                 progress()
         finally:
             is_well = process.end() or ended and not left
@@ -585,7 +617,8 @@ def shapes_of(model, bodies, path, most, hear, progress):
         rest = list(left.values())
         if len(batch) == 1:
             blamed += 1
-            why = f"takes IfcOpenShell longer than {limit:.0f} s" if is_late else "breaks IfcOpenShell"
+            slow = "stops IfcOpenShell" if process.stuck else f"takes IfcOpenShell longer than {limit:.0f} s"
+            why = slow if is_late else "breaks IfcOpenShell"
             hear({"step": rest[0].id(), "reason": why})
         else:
             size = max(1, len(rest) // 8)
@@ -631,8 +664,10 @@ def main(path, folder, most=60.0):
             say(done=i, total=2 * len(bodies), what="reading properties")
         if i % 20 == 0 and is_orphan():
             sys.exit(1)
-        element = elements[body.id()] = said(body, scale, area)
+        element = elements[body.id()] = said_of(body, scale, area)
         element["reason"] = keep_bodies(body)
+        if not body.GlobalId:  # Its iterator waits for ever where there is none.
+            body.GlobalId = ifcopenshell.guid.new()
         if of_class(body, STEEL):
             element["courses"] = courses(body, lines, scale)
         if not element["courses"] and not element["reason"]:
