@@ -12,6 +12,7 @@ use intrados_mechanics::read::Units;
 use intrados_scene::{
     AxisRuns,
     attach::{Along, Face, Kind, VoxelType},
+    import::KindByName,
     structure::{Course, Date, Electrode},
 };
 use intrados_transport::{Estimator, Roulette, Steering};
@@ -106,7 +107,7 @@ pub(crate) enum Command {
     New(New),
     /// Makes a project folder of a structure's model: IFC, glTF or OBJ
     #[command(
-        after_help = "Examples:\n  intrados import bridge.ifc --year 1974 --exposure \"XC4, XD3\"\n  intrados import tunnel.glb --out tunnel\n\nThe folder holds scene.ron (which every other command takes as it is), the geometry, evidence.ron and a README that says what was assumed by which rule.\nIFC is read by IfcOpenShell: pip install ifcopenshell==0.9.0.post1. INTRADOS_PYTHON names the Python that has it; python3 if unset."
+        after_help = "Examples:\n  intrados import bridge.ifc --year 1974 --exposure \"XC4, XD3\"\n  intrados import tunnel.glb --out tunnel\n\nThe folder holds scene.ron (which every other command takes as it is), the geometry, evidence.ron and a README that says what was assumed by which rule.\nIFC is read by IfcOpenShell: pip install ifcopenshell==0.9.0.post1. INTRADOS_PYTHON names the Python that has it; python3 if unset. An element that takes it longer than 60 s (INTRADOS_IFC_SECONDS) is left out and named."
     )]
     Import(Import),
     /// Puts evidence beside a scene: CT slices, a table (CSV), a load test, or a single finding
@@ -320,6 +321,36 @@ pub(crate) struct Import {
     /// What people, goods and traffic weigh on slabs in the long run, kN/m²; nothing if absent
     #[arg(long, value_name = "KN_M2", value_parser = imposed)]
     pub(crate) imposed: Option<f32>,
+    /// What elements of that name (or GlobalId) are: column, beam, slab, wall, footing, lining,
+    /// pipe, other, or none; again for others
+    #[arg(long = "kind", value_name = "NAME=KIND", value_parser = kind_by_name)]
+    pub(crate) kinds: Vec<KindByName>,
+}
+
+/// `Überbau=slab`.
+fn kind_by_name(text: &str) -> Result<KindByName, String> {
+    use intrados_scene::MemberKind as K;
+    let (name, kind) = text
+        .rsplit_once('=')
+        .filter(|(name, _)| !name.trim().is_empty())
+        .ok_or("give NAME=KIND, such as \"Deck 1=slab\"")?;
+    let kind = match kind.trim() {
+        "column" => Some(K::Column),
+        "beam" => Some(K::Beam),
+        "slab" => Some(K::Slab),
+        "wall" => Some(K::Wall),
+        "footing" => Some(K::Footing),
+        "lining" => Some(K::Lining),
+        "pipe" => Some(K::Pipe),
+        "other" => Some(K::Other),
+        "none" => None,
+        other => {
+            return Err(format!(
+                "{other} is none of column, beam, slab, wall, footing, lining, pipe, other, none"
+            ));
+        }
+    };
+    Ok(KindByName { name: name.into(), kind })
 }
 
 /// Storage halls carry some tens of kN/m².

@@ -34,6 +34,7 @@ pub(crate) fn run(session: &Session, args: &args::Import) -> Result<Outcome, Fai
         year: args.year,
         exposure: args.exposure.clone(),
         imposed_kpa: args.imposed,
+        kinds: args.kinds.clone(),
     };
     let progress = session.watch(format!("importing {}", args.model.display()));
     let imported = import::import(&args.model, &folder, &told, &session.access, &session.job)?;

@@ -1200,6 +1200,9 @@ impl Checker<'_> {
         }) {
             self.error("map.x_axis", "RANGE", "must be a direction: east and north, not both 0");
         }
+        if let Some(map) = &place.map {
+            self.within("map.scale", map.scale as f32, 0.5, 2.0);
+        }
         let degrees = [
             ("latitude_deg", place.latitude_deg, 90.0),
             ("longitude_deg", place.longitude_deg, 180.0),

@@ -10,13 +10,16 @@ use intrados_stage::{Cancelled, Job};
 use serde_json::Value;
 
 use super::{
+    KindByName,
+    ask::Idle,
     close::close,
-    course, grade,
-    kind::{By, Verdict, kind, lies_on_ground},
+    count, course, grade,
+    kind::{By, Verdict, Why, kind, lies_on_ground, likely},
     model::material,
     ring::{Piece, joined},
-    shape::{Tube, boxed, tube},
+    shape::{Tube, across, boxed, mean_depth, tube},
     source::{Course, Element, Source, Surface},
+    stray::without_strays,
 };
 use crate::{
     Frame, Member, MemberKind, Mesh, Object, Part, SteelLine,
@@ -40,6 +43,8 @@ pub(super) struct Built {
     pub(super) steel: Steel,
     /// Elements that are scenery, by class.
     pub(super) scenery: BTreeMap<String, usize>,
+    /// Those of them that may bear or weigh.
+    pub(super) idle: Vec<Idle>,
 }
 
 /// How many lines of steel.
@@ -84,9 +89,16 @@ pub(super) struct Found {
 const FAR: f64 = 1000.0;
 
 /// Builds a structure of what a source has.
-pub(super) fn build(source: &Source, model: Model, job: &Job) -> Result<Built, Cancelled> {
+pub(super) fn build(
+    source: &Source,
+    model: Model,
+    kinds: &[KindByName],
+    job: &Job,
+) -> Result<Built, Cancelled> {
+    let mut notes = Vec::new();
+    let elements = without_strays(source.elements.clone(), &mut notes);
     let mut builder = Builder {
-        built: Built { model, offset: offset(source), ..Built::default() },
+        built: Built { model, offset: offset(&elements), notes, ..Built::default() },
         ids: HashSet::new(),
         names: HashSet::new(),
         numbers: HashMap::new(),
@@ -95,11 +107,10 @@ pub(super) fn build(source: &Source, model: Model, job: &Job) -> Result<Built, C
         renamed: Vec::new(),
     };
     builder.clear();
-    let mut pieces = Vec::with_capacity(source.elements.len());
-    let mut open = 0;
-    for (i, element) in source.elements.iter().enumerate() {
-        job.step(i, source.elements.len())?;
-        let mut element = element.clone();
+    let mut pieces = Vec::with_capacity(elements.len());
+    let (mut open, count) = (0, elements.len());
+    for (i, mut element) in elements.into_iter().enumerate() {
+        job.step(i, count)?;
         element.surface.points.iter_mut().for_each(|p| *p -= builder.built.offset);
         let of_courses = element.courses.iter_mut().flat_map(|c| &mut c.line);
         of_courses.for_each(|p| *p -= builder.built.offset);
@@ -110,9 +121,14 @@ pub(super) fn build(source: &Source, model: Model, job: &Job) -> Result<Built, C
             open += 1;
         }
         let (solid, tube) = (boxed(&element.surface), tube(&element.surface));
-        let verdict = kind(&element, solid.as_ref(), tube.as_ref());
+        let verdict = match kinds.iter().find(|k| k.is_of(&element)).map(|k| k.kind) {
+            Some(Some(kind)) => Verdict::Member(kind, By::User),
+            Some(None) => Verdict::Scenery(Why::Name),
+            None => kind(&element, solid.as_ref(), tube.as_ref()),
+        };
         pieces.push(Piece { element, verdict, tube, segments: Vec::new() });
     }
+    let pieces = count::once(pieces, &mut builder.built.notes);
     let mut steel = Vec::new();
     for piece in joined(pieces) {
         match piece.verdict {
@@ -120,7 +136,8 @@ pub(super) fn build(source: &Source, model: Model, job: &Job) -> Result<Built, C
             Verdict::Member(kind, by) if !piece.element.surface.is_empty() => {
                 builder.member(piece, kind, by, source.metres_per_unit);
             }
-            Verdict::Member(..) | Verdict::Scenery => builder.scenery(&piece.element),
+            Verdict::Member(..) => builder.scenery(&piece.element, Why::Class),
+            Verdict::Scenery(why) => builder.scenery(&piece.element, why),
         }
     }
     for (i, element) in steel.iter().enumerate() {
@@ -138,9 +155,9 @@ pub(super) fn build(source: &Source, model: Model, job: &Job) -> Result<Built, C
 }
 
 /// Whole metres from the origin to the middle of the model, where that is far.
-fn offset(source: &Source) -> DVec3 {
-    let of_courses = source.elements.iter().flat_map(|e| &e.courses).flat_map(|c| &c.line);
-    let points = source.elements.iter().flat_map(|e| &e.surface.points).chain(of_courses);
+fn offset(elements: &[Element]) -> DVec3 {
+    let of_courses = elements.iter().flat_map(|e| &e.courses).flat_map(|c| &c.line);
+    let points = elements.iter().flat_map(|e| &e.surface.points).chain(of_courses);
     let [low, high] =
         points.fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |[l, h], p| [l.min(*p), h.max(*p)]);
     let middle = 0.5 * (low + high);
@@ -241,9 +258,11 @@ impl Builder {
         let name = self.distinct(&full_name(element), false);
         let bounds = element.surface.bounds();
         let volume = element.surface.volume();
-        let across = [frame.zero, frame.ninety()]
-            .map(|d| element.surface.span(d.as_dvec3()))
-            .map(|[low, high]| high - low);
+        let mut across = across(&element.surface, frame);
+        if kind == MemberKind::Slab {
+            let depth = mean_depth(&element.surface, frame.zero.as_dvec3());
+            across[0] = depth.map_or(across[0], |depth| depth.min(across[0]));
+        }
         let axis = frame.axis.as_dvec3().normalize_or_zero();
         let start = frame.start.as_dvec3();
         let reach = element.surface.points.iter().map(|p| (*p - start).reject_from(axis).length());
@@ -291,9 +310,19 @@ impl Builder {
         self.surfaces.push((element.surface.clone(), bounds));
     }
 
-    fn scenery(&mut self, element: &Element) {
+    fn scenery(&mut self, element: &Element, why: Why) {
         if element.surface.is_empty() {
             return;
+        }
+        if !matches!(why, Why::Class | Why::Name) {
+            self.built.idle.push(Idle {
+                why,
+                class: element.class.clone(),
+                name: crate::file::shorten(&element.name),
+                volume: element.surface.volume(),
+                bounds: element.surface.bounds(),
+                likely: likely(boxed(&element.surface).as_ref()),
+            });
         }
         let class = if element.class.is_empty() { "nodes" } else { &element.class };
         *self.built.scenery.entry(class.to_owned()).or_default() += 1;

@@ -20,6 +20,7 @@ const ROUNDS: usize = 20;
 pub(super) fn close(surface: &mut Surface) -> bool {
     weld(surface);
     if open_edges(surface).is_empty() {
+        outward(surface);
         return true;
     }
     orient(surface);
@@ -30,6 +31,13 @@ pub(super) fn close(surface: &mut Surface) -> bool {
     }
     fill(surface);
     open_edges(surface).is_empty()
+}
+
+/// Turns a closed surface round that looks inward all over.
+fn outward(surface: &mut Surface) {
+    if surface.signed_volume() < 0.0 {
+        surface.triangles.iter_mut().for_each(|t| t.swap(1, 2));
+    }
 }
 
 /// One corner a place; triangles without area are no triangles.

@@ -2,7 +2,7 @@
 //! program.
 
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, HashSet},
     io::{BufRead, BufReader, Read, Seek, SeekFrom},
     path::Path,
     process::{Child, Command, Stdio},
@@ -16,20 +16,24 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use super::{
-    ImportError,
+    ImportError, georeference,
     source::{Above, Course, Element, Georeference, Matter, Properties, Source, Surface},
 };
 
 /// The converter, which is ours.
-const SCRIPT: &str = include_str!("ifc.py");
+const SCRIPT: &str = concat!(include_str!("sweep.py"), include_str!("ifc.py"));
 /// What brings IfcOpenShell.
 const INSTALL: &str = "pip install ifcopenshell==0.9.0.post1";
 /// Longest file that is read, bytes: IfcOpenShell takes some ten times as much memory.
 pub(super) const LONGEST: u64 = 1 << 30;
 /// Longest answer that is read, bytes.
 const LONGEST_ANSWER: u64 = 2 << 30;
-/// How long the converter may be silent: one element alone takes it no longer.
+/// How long the converter may be silent, while it opens the file and reads properties.
 const SILENCE: Duration = Duration::from_secs(300);
+/// How long one element may take it, s, where `INTRADOS_IFC_SECONDS` does not say.
+const ONE_ELEMENT: f64 = 60.0;
+/// How long it may take to end once it is asked to.
+const GRACE: Duration = Duration::from_millis(500);
 
 /// What the converter says while it works.
 #[derive(Debug, Default, Deserialize)]
@@ -73,6 +77,15 @@ struct Told {
     attributes: BTreeMap<String, Value>,
     courses: Vec<ToldCourse>,
     shapes: Vec<Shape>,
+    /// Types of what its body is made of, where there is no surface.
+    #[serde(default)]
+    items: String,
+    /// Why there is none.
+    #[serde(default)]
+    reason: String,
+    /// What is wrong with all else that the file says of it.
+    #[serde(default)]
+    damaged: String,
 }
 
 #[derive(Debug, Deserialize)]
@@ -162,11 +175,17 @@ fn look(path: &Path) -> Result<(), ImportError> {
     }
 }
 
-/// A process that ends with us.
+/// A process that ends with us: it watches its standard input, of which we hold the other end, and
+/// ends those that it started.
 struct Running(Child);
 
 impl Drop for Running {
     fn drop(&mut self) {
+        drop(self.0.stdin.take());
+        let begin = Instant::now();
+        while begin.elapsed() < GRACE && matches!(self.0.try_wait(), Ok(None)) {
+            std::thread::sleep(Duration::from_millis(10));
+        }
         let _ = self.0.kill();
         let _ = self.0.wait();
     }
@@ -175,6 +194,12 @@ impl Drop for Running {
 /// The Python that `INTRADOS_PYTHON` names, else `python3`.
 fn python() -> std::ffi::OsString {
     std::env::var_os("INTRADOS_PYTHON").filter(|v| !v.is_empty()).unwrap_or("python3".into())
+}
+
+/// How long one element may take, s.
+fn seconds() -> f64 {
+    let said = std::env::var("INTRADOS_IFC_SECONDS").ok().and_then(|s| s.trim().parse().ok());
+    said.filter(|s| (0.1..=1e5).contains(s)).unwrap_or(ONE_ELEMENT)
 }
 
 fn run(path: &Path, script: &Path, folder: &Path, job: &Job) -> Result<(), ImportError> {
@@ -186,7 +211,8 @@ fn run(path: &Path, script: &Path, folder: &Path, job: &Job) -> Result<(), Impor
         .arg(script)
         .arg(path)
         .arg(folder)
-        .stdin(Stdio::null())
+        .arg(seconds().to_string())
+        .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .stderr(log)
         .spawn()
@@ -298,32 +324,32 @@ fn source(answer: Answer, shapes: &[u8]) -> Result<Source, String> {
             answer.units.join(", ")
         ));
     }
+    let missing = bodiless(&answer.elements);
+    let damaged: Vec<String> = (answer.elements.iter().filter(|e| !e.damaged.is_empty()))
+        .map(|e| {
+            let name = crate::file::shorten(&e.name);
+            format!("{} \"{name}\": its properties are damaged ({}): left out", e.class, e.damaged)
+        })
+        .collect();
     let elements: Result<Vec<Element>, String> =
         answer.elements.into_iter().map(|told| element(told, shapes)).collect();
-    let elements = elements?;
-    let bodiless = elements
-        .iter()
-        .filter(|e| e.surface.is_empty() && e.courses.is_empty())
-        .map(|e| format!("{} {:?}", e.class, e.name))
-        .collect::<Vec<_>>();
-    if let [first, rest @ ..] = &bodiless[..] {
-        notes.push(format!(
-            "{} elements have no shape that IfcOpenShell could make, among them {first}: they are left out",
-            1 + rest.len()
+    let mut elements = elements?;
+    if elements.iter().all(|e| e.surface.is_empty() && e.courses.is_empty()) {
+        let why =
+            if missing.is_empty() { "no element has a body".into() } else { missing.join("; ") };
+        return Err(format!(
+            "has no surfaces: {why}; export bodies as extrusions or as triangles (IfcTriangulatedFaceSet)"
         ));
     }
+    notes.extend(missing.into_iter().map(|m| format!("{m}: left out, and its load is missing")));
+    notes.extend(elements.iter_mut().filter_map(|e| e.twice.take()));
+    notes.extend(damaged);
     let unit = answer.units.first().cloned().unwrap_or_default();
-    let mut georeference = answer.georeference;
-    // Without a unit of its own, a map conversion has the project's (IfcProjectedCRS.MapUnit).
     let scale = answer.metres_per_unit;
-    if let Some(map) = &mut georeference.map {
-        for length in [&mut map.eastings, &mut map.northings, &mut map.height] {
-            *length *= scale;
-        }
-    }
-    georeference.elevation = georeference.elevation.map(|e| e * scale);
+    let georeference = georeference::resolve(answer.georeference, scale, &mut notes);
     Ok(Source {
         format: format!("{} in {unit}, by IfcOpenShell {}", answer.schema, answer.ifcopenshell),
+        is_ifc: true,
         project: answer.project,
         year: answer.year,
         elements,
@@ -333,14 +359,68 @@ fn source(answer: Answer, shapes: &[u8]) -> Result<Source, String> {
     })
 }
 
+/// Elements without a body, by class and reason; not those whose parts have one.
+fn bodiless(elements: &[Told]) -> Vec<String> {
+    let wholes: HashSet<&str> =
+        elements.iter().flat_map(|e| &e.above).map(|above| above.id.as_str()).collect();
+    let mut of: BTreeMap<(&str, &str, &str), Vec<&str>> = BTreeMap::new();
+    let is_without = |e: &&Told| e.shapes.is_empty() && e.courses.is_empty();
+    for told in elements.iter().filter(is_without) {
+        if !wholes.contains(told.id.as_str()) && !told.class.starts_with("IfcReinforcing") {
+            let key = (told.class.as_str(), told.items.as_str(), told.reason.as_str());
+            of.entry(key).or_default().push(&told.name);
+        }
+    }
+    let said = |((class, items, reason), names): ((&str, &str, &str), Vec<&str>)| {
+        let name = crate::file::shorten(names.first().copied().unwrap_or_default());
+        let shape = if items.is_empty() { String::new() } else { format!(", {items}") };
+        let reason = if reason.is_empty() { "has no shape" } else { reason };
+        match names.len() {
+            1 => format!("{class} \"{name}\"{shape}: {reason}"),
+            n => format!("{n} {class} (such as \"{name}\"{shape}): {reason}"),
+        }
+    };
+    of.into_iter().map(said).collect()
+}
+
+/// Share of the smaller of two boxes in the other beyond which two bodies of an element are one.
+const SAME_PLACE: f64 = 0.5;
+
+/// Whether two bodies of an element lie at one place: the same one in two kinds of shape.
+fn is_same_place(a: &Surface, b: &Surface) -> bool {
+    let volume = |[low, high]: [DVec3; 2]| (high - low).max(DVec3::ZERO).element_product();
+    let ([la, ha], [lb, hb]) = (a.bounds(), b.bounds());
+    let smaller = volume([la, ha]).min(volume([lb, hb]));
+    smaller > 0.0 && volume([la.max(lb), ha.min(hb)]) > SAME_PLACE * smaller
+}
+
+/// A Body is said once; some exporters say it again, as another kind of shape, and some in pieces.
+/// Pieces lie beside each other, and all count.
 fn element(told: Told, shapes: &[u8]) -> Result<Element, String> {
     let mut surface = Surface::default();
     let mut colour = None;
+    let mut again = 0;
     for shape in &told.shapes {
-        add(&mut surface, shape, shapes)
+        let mut own = Surface::default();
+        add(&mut own, shape, shapes)
             .ok_or_else(|| format!("IfcOpenShell's shape of #{} is damaged", told.step))?;
         colour = colour.or(shape.colour.map(Vec3::from_array));
+        if !surface.is_empty() && is_same_place(&surface, &own) {
+            again += 1;
+            continue;
+        }
+        let first = surface.points.len() as u32;
+        surface.points.append(&mut own.points);
+        surface.triangles.extend(own.triangles.iter().map(|t| t.map(|i| i + first)));
     }
+    let twice = (again > 0).then(|| {
+        let name = crate::file::shorten(&told.name);
+        format!(
+            "{} \"{name}\" has {} bodies at one place: the first one counts",
+            told.class,
+            1 + again
+        )
+    });
     let course = |c: ToldCourse| Course {
         diameter: c.diameter,
         line: c.line.into_iter().map(|p| upright(DVec3::from_array(p))).collect(),
@@ -358,6 +438,7 @@ fn element(told: Told, shapes: &[u8]) -> Result<Element, String> {
         courses: told.courses.into_iter().map(course).filter(|c| c.line.len() > 1).collect(),
         surface,
         colour,
+        twice,
         ..Element::default()
     })
 }

@@ -34,14 +34,30 @@ pub(super) fn on_ground(members: &[Standing]) -> Vec<bool> {
         .map(|m| match m.kind {
             _ if m.is_tube || m.is_grounded => true,
             MemberKind::Footing => true,
+            MemberKind::Slab if is_blinding(members, m) => true,
             _ if m.is_level => m.bounds[0].y < lowest + LOWEST && !carried(m),
             _ => !carried(m),
         })
         .collect()
 }
 
+/// Lean concrete below a footing is no thicker, m, and stands out no further.
+const BLINDING: f32 = 0.2;
+const OUTSTAND: f32 = 0.6;
+
+/// Whether a thin slab is what a footing was cast on.
+pub(super) fn is_blinding(members: &[Standing], m: &Standing) -> bool {
+    let [low, high] = m.bounds;
+    let is_above = |other: &&Standing| {
+        let [l, h] = other.bounds;
+        let within = |i: usize| low[i] > l[i] - OUTSTAND && high[i] < h[i] + OUTSTAND;
+        other.kind == MemberKind::Footing && (l.y - high.y).abs() < SLACK && within(0) && within(2)
+    };
+    m.kind == MemberKind::Slab && high.y - low.y < BLINDING && members.iter().any(|o| is_above(&o))
+}
+
 /// Whether `other` begins below the foot of `m` and reaches up to it.
-fn reaches(other: &Standing, m: &Standing) -> bool {
+pub(super) fn reaches(other: &Standing, m: &Standing) -> bool {
     let foot = m.bounds[0].y;
     let overlap = |i: usize| {
         other.bounds[0][i] < m.bounds[1][i] + SLACK && other.bounds[1][i] > m.bounds[0][i] - SLACK
@@ -80,6 +96,11 @@ mod tests {
         // An approach slab lies on the fill, though it ends on a beam.
         let approach = Standing { is_grounded: true, ..members[4] };
         assert!(on_ground(&[&members[..4], &[approach]].concat())[4]);
+        // Lean concrete under the footing lies on the ground, whatever is drawn below it.
+        let mut cast = members.to_vec();
+        cast.push(standing(Slab, [-1.1, -0.7, -1.1], [1.1, -0.6, 1.1], true));
+        cast.push(standing(Slab, [-20.0, -3.0, -20.0], [20.0, -2.5, 20.0], true));
+        assert!(on_ground(&cast)[6]);
         // Without its footing the first column stands on the ground.
         assert!(on_ground(&members[1..])[0]);
     }

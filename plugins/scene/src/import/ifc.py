@@ -1,4 +1,9 @@
-"""Reads an IFC file with IfcOpenShell: python3 ifc.py MODEL.ifc FOLDER
+"""Reads an IFC file with IfcOpenShell: python3 ifc.py MODEL.ifc FOLDER [SECONDS]
+
+SECONDS is how long one element may take (60 where nothing is said): what takes longer, or breaks
+IfcOpenShell, is left out with its reason. Shapes are made in processes of their own, so that such
+an element costs no other. All of them end with the process that started this one: it holds the
+other end of standard input.
 
 Writes FOLDER/elements.json (what the file says of every element) and FOLDER/shapes.bin (corners as
 three doubles, m, z up; triangles as three 32-bit numbers; little-endian). Lines on standard output
@@ -10,7 +15,11 @@ import array
 import json
 import os
 import re
+import select
+import signal
+import stat
 import sys
+import time
 
 OLDEST = (0, 8)
 # Products that are no bodies: rooms, holes, lines, and what an analysis model is made of.
@@ -42,6 +51,7 @@ if version < OLDEST:
     fault("old", ifcopenshell.version)
 try:
     import ifcopenshell.geom as geom
+    import ifcopenshell.guid
     import ifcopenshell.util.element as about
     import ifcopenshell.util.placement as placement
     import numpy
@@ -49,10 +59,19 @@ except ImportError as error:
     fault("absent", error)
 
 
+unswept = {}  # Why solids along alignments could not be made, by their numbers.
+
+
 def opened(path):
-    """The file; drafts of schemas that were never released are read as the last released one."""
+    """The file; drafts of schemas that were never released are read as the last released one, and
+    solids along alignments are made here (sweep.py)."""
+    draft = None
     try:
-        return ifcopenshell.open(path), None
+        model = ifcopenshell.open(path)
+        if not instances(model, "IfcSectionedSolidHorizontal"):
+            return model, None
+        with open(path, encoding="latin-1") as file:
+            text = file.read()
     except ifcopenshell.SchemaError as error:
         with open(path, encoding="latin-1") as file:
             text = file.read()
@@ -60,8 +79,11 @@ def opened(path):
         own = schema.search(text)
         if not own or not own.group(1).upper().startswith("IFC4"):
             fault("schema", error)
-        text = text[: own.start(1)] + "IFC4X3_ADD2" + text[own.end(1):]
-        return ifcopenshell.file.from_string(text), own.group(1)
+        text, draft = text[: own.start(1)] + "IFC4X3_ADD2" + text[own.end(1):], own.group(1)
+    is_early = draft is not None and draft.upper() != "IFC4X3"
+    text, reasons = swept(text, is_early)
+    unswept.update(reasons)
+    return ifcopenshell.file.from_string(text), draft
 
 
 def of_class(element, names):
@@ -146,7 +168,7 @@ def above(element):
             here = None
         if here is None:
             break
-        told.append({"class": here.is_a(), "name": here.Name or "", "id": here.GlobalId})
+        told.append({"class": here.is_a(), "name": here.Name or "", "id": here.GlobalId or ""})
     return told
 
 
@@ -187,7 +209,26 @@ def said(element, scale, area):
         "attributes": attributes(element, scale, area),
         "courses": [],
         "shapes": [],
+        "items": "",
+        "reason": "",
     }
+
+
+def said_of(element, scale, area):
+    """The same of any element: what is damaged in it is left out, and a GlobalId that is missing is
+    an empty one."""
+    try:
+        told = said(element, scale, area)
+    except Exception as error:
+        told = {
+            "step": element.id(), "class": element.is_a(), "name": str(element.Name or ""),
+            "object_type": "", "predefined": "", "type": "", "above": above(element),
+            "properties": {}, "materials": [], "attributes": {}, "courses": [], "shapes": [],
+            "items": "", "reason": "", "id": None,
+            "damaged": shortened(error),
+        }
+    told["id"] = element.GlobalId or ""
+    return told
 
 
 def length_units(model):
@@ -221,25 +262,53 @@ def metres(unit):
 
 
 def georeference(model):
-    """Where the model's origin lies on earth, as far as the file says it."""
+    """Where the model's origin lies on earth, as far as the file says it; lengths in m."""
     told = {}
-    for conversion in instances(model, "IfcMapConversion")[:1]:
-        crs = conversion.TargetCRS
+    _, scale, _ = length_units(model)
+    conversion = map_conversion(model)
+    if conversion is not None:
+        own, crs, unit = conversion
         told["map"] = {
-            "crs": (crs.Name or "") if crs else "",
-            "eastings": conversion.Eastings, "northings": conversion.Northings,
-            "height": conversion.OrthogonalHeight,
-            "abscissa": conversion.XAxisAbscissa, "ordinate": conversion.XAxisOrdinate,
-            "scale": conversion.Scale,
+            "crs": crs, "eastings": own.get("Eastings"), "northings": own.get("Northings"),
+            "height": own.get("OrthogonalHeight") or 0.0,
+            "abscissa": own.get("XAxisAbscissa"), "ordinate": own.get("XAxisOrdinate"),
+            "scale": own.get("Scale"), "metres_per_unit": unit,
         }
+        if None in (told["map"]["eastings"], told["map"]["northings"]):
+            del told["map"]
     for site in instances(model, "IfcSite")[:1]:
         for key, value in (("latitude", site.RefLatitude), ("longitude", site.RefLongitude)):
             if value:
-                parts = list(value) + [0, 0, 0, 0]
-                told[key] = parts[0] + parts[1] / 60 + (parts[2] + parts[3] * 1e-6) / 3600
+                told[key] = degrees(value)
         if site.RefElevation is not None:
-            told["elevation"] = site.RefElevation
+            told["elevation"] = site.RefElevation * scale
     return told
+
+
+def degrees(parts):
+    """Degrees, minutes, seconds and millionths: all of one sign, or the first alone has it."""
+    parts = list(parts) + [0, 0, 0, 0]
+    size = abs(parts[0]) + abs(parts[1]) / 60 + (abs(parts[2]) + abs(parts[3]) * 1e-6) / 3600
+    return -size if any(part < 0 for part in parts[:4]) else size
+
+
+def map_conversion(model):
+    """Values of the map conversion, name of its reference system, metres per unit of the map where
+    that has one of its own. In IFC2X3 a property set of the site or the project tells them."""
+    conversions = instances(model, "IfcMapConversion")
+    conversions.sort(key=lambda c: getattr(c.SourceCRS, "ContextType", None) != "Model")
+    for conversion in conversions[:1]:
+        crs = conversion.TargetCRS
+        unit = getattr(crs, "MapUnit", None)
+        return conversion.get_info(recursive=False), (crs.Name or "") if crs else "", metres(unit) if unit else None
+    for thing in instances(model, "IfcSite")[:1] + instances(model, "IfcProject")[:1]:
+        sets = {name.lower(): values for name, values in properties(thing).items()}
+        own = sets.get("epset_mapconversion")
+        if own and model.schema == "IFC2X3":
+            crs = sets.get("epset_projectedcrs", {})
+            unit = {"METRE": 1.0, "METER": 1.0, "MILLIMETRE": 1e-3, "FOOT": 0.3048}.get(str(crs.get("MapUnit", "")).upper())
+            return own, str(crs.get("Name", "")), unit
+    return None
 
 
 def year(model):
@@ -301,11 +370,77 @@ def ordered(points, edges):
     return points[chain]
 
 
+# Representations that are never the body, by identifier and by type.
+NO_BODY = ("axis", "box", "footprint", "profile", "clearance", "reference", "cog", "annotation",
+           "lighting", "plan", "surveypoints")
+NO_SOLID = ("boundingbox", "curve2d", "curve3d", "curve", "point", "pointcloud", "geometricset",
+            "geometriccurveset", "annotation2d", "fillarea", "text", "lightsource", "segment")
+# The others, the best first: what says nothing of itself is taken for a body.
+BODIES = ("body", "facetation", "tessellation", "body-fallback", "mesh", "", None, "surface")
+
+
+def is_model(representation):
+    """Whether it is part of the model in three dimensions, and no plan."""
+    context = representation.ContextOfItems
+    kind = (getattr(context, "ContextType", None) or "Model").lower()
+    view = getattr(context, "TargetView", None)
+    return kind != "plan" and view not in ("PLAN_VIEW", "REFLECTED_PLAN_VIEW", "SECTION_VIEW", "ELEVATION_VIEW")
+
+
+def rank(representation):
+    """How good a body it is, the least the best; none where it is none."""
+    name = representation.RepresentationIdentifier
+    if not name:  # Its context may say what it leaves open.
+        name = getattr(representation.ContextOfItems, "ContextIdentifier", None) or ""
+    name = name.strip().lower()
+    kind = (representation.RepresentationType or "").strip().lower()
+    if name in NO_BODY or kind in NO_SOLID or not representation.Items:
+        return None
+    at = BODIES.index(name if name in BODIES else None)
+    view = getattr(representation.ContextOfItems, "TargetView", None)
+    return (not is_model(representation), at, view not in (None, "MODEL_VIEW", "NOTDEFINED"))
+
+
+def keep_bodies(element):
+    """Leaves an element its body alone, in memory: several of the same name stay, and who reads
+    this decides by where they lie. Why it has none, or an empty text."""
+    shape = element.Representation
+    ranked = [(rank(r), r) for r in shape.Representations]
+    best = min((order for order, _ in ranked if order is not None), default=None)
+    if best is None:
+        kinds = ", ".join(sorted({r.RepresentationIdentifier or r.RepresentationType or "?" for r in shape.Representations}))
+        return f"has no body, only {kinds}" if kinds else "has an empty shape"
+    kept = [r for order, r in ranked if order == best]
+    if len(kept) < len(ranked):
+        shape.Representations = kept
+    return ""
+
+
+def what_it_is(element):
+    """Types of the items of its body, for people: IfcSectionedSolidHorizontal."""
+    found = []
+    for representation in element.Representation.Representations:
+        for item in representation.Items:
+            if item.is_a("IfcMappedItem"):
+                found += [i.is_a() for i in item.MappingSource.MappedRepresentation.Items]
+            else:
+                found.append(item.is_a())
+    return ", ".join(sorted(set(found))[:3])
+
+
+def own_reason(element):
+    """Why a solid of it that runs along an alignment could not be made; empty where none does."""
+    items = [i for r in element.Representation.Representations for i in r.Items]
+    maps = [i.MappingSource.MappedRepresentation.Items for i in items if i.is_a("IfcMappedItem")]
+    found = [unswept[i.id()] for i in items + [i for own in maps for i in own] if i.id() in unswept]
+    return found[0] if found else ""
+
+
 class Shapes:
     """Surfaces on their way to the disk; what several elements share is written once."""
 
-    def __init__(self, path):
-        self.file, self.at, self.known = open(path, "wb"), 0, {}
+    def __init__(self, path, at):
+        self.file, self.at, self.known = open(path, "ab"), at, {}
 
     def add(self, shape):
         geometry = shape.geometry
@@ -316,6 +451,7 @@ class Shapes:
             place = {"at": self.at, "corners": len(corners) // 3, "triangles": len(faces) // 3}
             self.file.write(corners.tobytes())
             self.file.write(faces.tobytes())
+            self.file.flush()
             self.at += corners.itemsize * len(corners) + faces.itemsize * len(faces)
             self.known[geometry.id] = {**place, "colour": colour(geometry)}
         matrix = shape.transformation.matrix
@@ -333,13 +469,179 @@ def colour(geometry):
     return None
 
 
-def main(path, folder):
+def make_shapes(model, batch, path, at, tell):
+    """Shapes of some elements to the file at `path`, from its byte `at` on; `tell` hears of each
+    element that is begun or done. What a process of its own does."""
+    shapes = Shapes(path, at)
+    settings = geom.settings()
+    settings.set("weld-vertices", True)
+    if len(batch) > 1:
+        left = {body.id() for body in batch}
+        threads = min(4, os.cpu_count() or 1)
+        iterator = geom.iterator(settings, model, threads, include=batch)
+        if iterator.initialize():
+            while True:
+                shape = iterator.get()
+                tell(step=shape.id, shape=shapes.add(shape))
+                left.discard(shape.id)
+                if not iterator.next():
+                    break
+        batch = [body for body in batch if body.id() in left]
+    for body in batch:
+        tell(begun=body.id())
+        try:
+            for representation in body.Representation.Representations:
+                tell(step=body.id(), shape=shapes.add(geom.create_shape(settings, body, representation)))
+        except Exception as error:
+            tell(step=body.id(), reason=f"IfcOpenShell cannot make its shape ({shortened(error)})")
+    shapes.file.close()
+
+
+def shortened(error):
+    """What went wrong, without the name of the element, which is said beside it."""
+    text = " ".join(str(error).split()).split(" Product: ")[0].rstrip(". ,")
+    return (text or type(error).__name__)[:120]
+
+
+def bound_to_parent():
+    """Ends this process with the one that started it, where the system can."""
+    try:
+        import ctypes
+        ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG of Linux.
+    except Exception:
+        pass
+
+
+def is_orphan():
+    """Whether who started this has gone: standard input is a pipe from there, and nothing comes."""
+    try:
+        is_pipe = stat.S_ISFIFO(os.fstat(0).st_mode)
+        return is_pipe and bool(select.select([0], [], [], 0)[0]) and not os.read(0, 1)
+    except (OSError, ValueError):
+        return False
+
+
+# What has hardly worked for so long, s, waits for ever.
+IDLE = 15.0
+
+
+class Isolated:
+    """A process that makes shapes, and the pipe on which it tells of them."""
+
+    def __init__(self, model, batch, path, at):
+        back, out = os.pipe()
+        self.pid = os.fork()
+        if self.pid == 0:
+            bound_to_parent()
+            os.close(back)
+            os.dup2(2, 1)  # IfcOpenShell prints what it builds.
+            with os.fdopen(out, "w") as pipe:
+                make_shapes(model, batch, path, at, lambda **words: print(json.dumps(words), file=pipe, flush=True))
+            os._exit(0)
+        os.close(out)
+        self.back, self.rest, self.begin = back, b"", time.monotonic()
+        self.worked, self.moved, self.stuck = -1.0, self.begin, False
+
+    def work(self):
+        """How long it has worked, s: on a busy machine a clock would blame the innocent. The clock,
+        where the system does not say it."""
+        now = time.monotonic()
+        try:
+            with open(f"/proc/{self.pid}/stat", encoding="latin-1") as file:
+                numbers = file.read().rsplit(")", 1)[1].split()
+            work = (int(numbers[11]) + int(numbers[12])) / os.sysconf("SC_CLK_TCK")
+        except (OSError, ValueError, IndexError):
+            return now - self.begin
+        if self.worked < 0 or now - self.moved > IDLE:
+            # A hundredth of the time is what waiting itself takes.
+            self.stuck = self.worked >= 0 and work - self.worked < 0.01 * (now - self.moved)
+            self.worked, self.moved = work, now
+        return work
+
+    def lines(self, seconds):
+        """What it tells within so many seconds; none when it has ended."""
+        if not select.select([self.back], [], [], seconds)[0]:
+            return []
+        read = os.read(self.back, 1 << 16)
+        if not read:
+            return None
+        *lines, self.rest = (self.rest + read).split(b"\n")
+        return [json.loads(line) for line in lines]
+
+    def end(self):
+        """Whether it ended well."""
+        try:
+            os.kill(self.pid, signal.SIGKILL)
+        except ProcessLookupError:
+            pass
+        os.close(self.back)
+        return os.waitpid(self.pid, 0)[1] == 0
+
+
+def shapes_of(model, bodies, path, most, hear, progress):
+    """All shapes. A process that breaks or says nothing in `most` seconds of work is replaced: what it
+    left is tried in ever smaller parts, until the element is alone that is to blame."""
+    open(path, "wb").close()
+    if not hasattr(os, "fork"):  # All in this process: a bad element costs the others here.
+        def tell(**words):
+            if "step" in words:
+                hear(words)
+            progress()
+        make_shapes(model, bodies, path, 0, tell)
+        return
+    queue, blamed = [bodies] if bodies else [], 0
+    while queue:
+        batch = queue.pop(0)
+        limit = max(5.0 if most > 5 else most, most / (1 + blamed))
+        at = os.path.getsize(path)
+        left = {body.id(): body for body in batch}
+        # Of a batch several are made at a time.
+        most_work = limit * (min(4, os.cpu_count() or 1) if len(batch) > 1 else 1)
+        process, heard, is_late, ended = Isolated(model, batch, path, at), 0.0, False, False
+        try:
+            while not is_late and not ended:
+                lines = process.lines(0.2)
+                if lines:
+                    heard = process.work()
+                for words in lines or ():
+                    if "step" in words:
+                        left.pop(words["step"], None)
+                        hear(words)
+                ended = lines is None
+                is_late = not ended and (process.work() - heard > most_work or process.stuck)
+                progress()
+        finally:
+            is_well = process.end() or ended and not left
+        if is_well or not left:
+            continue
+        rest = list(left.values())
+        if len(batch) == 1:
+            blamed += 1
+            slow = "stops IfcOpenShell" if process.stuck else f"takes IfcOpenShell longer than {limit:.0f} s"
+            why = slow if is_late else "breaks IfcOpenShell"
+            hear({"step": rest[0].id(), "reason": why})
+        else:
+            size = max(1, len(rest) // 8)
+            queue[:0] = [rest[i:i + size] for i in range(0, len(rest), size)]
+
+
+def forget_libraries(model):
+    """Takes libraries and second projects out, in memory: IfcOpenShell knows no unit beside them, and
+    millimetres would be metres."""
+    projects = [p for p in instances(model, "IfcProject") if getattr(p, "UnitsInContext", None)]
+    for other in instances(model, "IfcProjectLibrary") + projects[1:]:
+        model.remove(other)
+
+
+def main(path, folder, most=60.0):
+    bound_to_parent()
     try:
         model, draft = opened(path)
     except Exception as error:
         fault("damaged", error)
     if not model.by_type("IfcProject"):
         fault("damaged", "there is no IfcProject in it")
+    forget_libraries(model)
     units, scale, area = length_units(model)
     if not scale or not scale > 0:
         fault("units")
@@ -360,32 +662,47 @@ def main(path, folder):
     for i, body in enumerate(bodies):
         if i % 200 == 0:
             say(done=i, total=2 * len(bodies), what="reading properties")
-        element = elements[body.id()] = said(body, scale, area)
+        if i % 20 == 0 and is_orphan():
+            sys.exit(1)
+        element = elements[body.id()] = said_of(body, scale, area)
+        element["reason"] = keep_bodies(body)
+        if not body.GlobalId:  # Its iterator waits for ever where there is none.
+            body.GlobalId = ifcopenshell.guid.new()
         if of_class(body, STEEL):
             element["courses"] = courses(body, lines, scale)
-        if not element["courses"]:
+        if not element["courses"] and not element["reason"]:
             surfaces.append(body)
-    shapes = Shapes(os.path.join(folder, "shapes.bin"))
-    settings = geom.settings()
-    settings.set("weld-vertices", True)
-    iterator = geom.iterator(settings, model, min(4, os.cpu_count() or 1), include=surfaces) if surfaces else None
-    if iterator is not None and iterator.initialize():
-        done = 0
-        while True:
-            shape = iterator.get()
-            element = elements.get(shape.id)
-            if element is not None:
-                element["shapes"].append(shapes.add(shape))
-                done += 1
-                if done % 20 == 1:
-                    say(done=len(bodies) + done, total=2 * len(bodies), what=f"{element['class']} #{element['step']}")
-            if not iterator.next():
-                break
-    shapes.file.close()
+    clock = {"done": 0, "told": 0.0}
+
+    def hear(words):
+        element = elements.get(words["step"])
+        if element is None:
+            return
+        if "shape" in words:
+            clock["done"] += not element["shapes"]
+            element["shapes"].append(words["shape"])
+            element["reason"] = ""
+        else:
+            element["reason"] = words["reason"]
+        clock["what"] = f"{element['class']} #{element['step']}"
+
+    def progress():
+        if is_orphan():
+            raise SystemExit(1)
+        if time.monotonic() - clock["told"] > 0.5:
+            clock["told"] = time.monotonic()
+            say(done=len(bodies) + clock["done"], total=2 * len(bodies), what=clock.get("what", "making shapes"))
+
+    shapes_of(model, surfaces, os.path.join(folder, "shapes.bin"), most, hear, progress)
+    for body in bodies:
+        element = elements[body.id()]
+        if not element["shapes"] and not element["courses"]:
+            element["reason"] = own_reason(body) or element["reason"] or "IfcOpenShell makes no surface of it"
+            element["items"] = what_it_is(body)
     told["elements"] = [elements[step] for step in sorted(elements)]
     with open(os.path.join(folder, "elements.json"), "w", encoding="utf-8") as file:
         json.dump(told, file)
     say(ready=True)
 
 
-main(sys.argv[1], sys.argv[2])
+main(sys.argv[1], sys.argv[2], *map(float, sys.argv[3:4]))

@@ -9,11 +9,14 @@
 //! and `project` writes. The folder is made beside its place, opened as any scene would be, and
 //! put there whole.
 
+mod ask;
 mod assume;
 mod build;
 mod close;
 mod convert;
+mod count;
 mod course;
+mod georeference;
 mod grade;
 mod ground;
 mod kind;
@@ -22,6 +25,7 @@ mod project;
 mod ring;
 mod shape;
 mod source;
+mod stray;
 
 pub use assume::concrete as concrete_of;
 pub use convert::ifcopenshell;
@@ -48,6 +52,24 @@ pub struct Told {
     pub exposure: Option<String>,
     /// What people, goods and traffic weigh on its slabs, kN/m².
     pub imposed_kpa: Option<f32>,
+    /// What elements are, where the model does not say it or says it wrong.
+    pub kinds: Vec<KindByName>,
+}
+
+/// What elements of a name are.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct KindByName {
+    /// Name or id of elements.
+    pub name: String,
+    /// `None` where they are no members.
+    pub kind: Option<MemberKind>,
+}
+
+impl KindByName {
+    fn is_of(&self, element: &source::Element) -> bool {
+        let is = |own: &str| own.trim().eq_ignore_ascii_case(self.name.trim());
+        is(&element.name) || is(&element.id)
+    }
 }
 
 /// What came of an import.
@@ -196,9 +218,26 @@ pub fn import(
         }
     };
     job.relabel(format!("looking at {}", path.display()));
-    let mut built = build::build(&source, model, &job.part(0.8, 0.95))?;
+    unknown_names(path, &source, &told.kinds)?;
+    let mut built = build::build(&source, model, &told.kinds, &job.part(0.8, 0.95))?;
     measure(path, &mut built, told, extension == "ifc")?;
     project::write(path, folder, &source, &built, told, &job.part(0.95, 1.0))
+}
+
+/// Refuses what is said of an element that the model does not have.
+fn unknown_names(
+    path: &Path,
+    source: &source::Source,
+    kinds: &[KindByName],
+) -> Result<(), ImportError> {
+    let has = |kind: &KindByName| source.elements.iter().any(|e| kind.is_of(e));
+    let Some(unknown) = kinds.iter().find(|kind| !has(kind)) else { return Ok(()) };
+    let names = || source.elements.iter().map(|e| e.name.as_str());
+    let wanted = unknown.name.to_lowercase();
+    let near = names().find(|name| name.to_lowercase().contains(&wanted));
+    let meant = near.map_or_else(String::new, |near| format!("; did you mean \"{near}\"?"));
+    let what = format!("--kind: has no element that is called \"{}\"{meant}", unknown.name);
+    Err(ImportError::bad(path, what))
 }
 
 /// Refuses a folder that holds something.

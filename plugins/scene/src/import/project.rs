@@ -13,10 +13,12 @@ use intrados_stage::{Job, file};
 
 use super::{
     ImportError, Imported, Told,
+    ask::questions,
     assume::{self, Measures, STEEL, YEARS},
     build::{Built, Found},
+    georeference::words,
     grade::Concrete,
-    ground::{Standing, on_ground},
+    ground::{Standing, is_blinding, on_ground},
     source::{Source, Surface},
 };
 use crate::{
@@ -221,7 +223,7 @@ fn vector(v: Vec3) -> String {
 }
 
 /// The word of a kind in JSON.
-fn word(kind: MemberKind) -> String {
+pub(super) fn word(kind: MemberKind) -> String {
     let value = serde_json::to_value(kind).ok();
     value.and_then(|v| v.as_str().map(str::to_owned)).unwrap_or_default()
 }
@@ -265,7 +267,7 @@ fn scene(name: &str, source: &Source, built: &Built, members: &[Detail], told: &
             camera.height
         );
     }
-    text += &supports(members, &on_ground(&standing(built)));
+    text += &supports(members, &standing(built));
     text += &loads(members, told);
     text += &georeference(source, built);
     text += ")\n";
@@ -428,13 +430,14 @@ fn is_level(found: &Found) -> bool {
 
 /// What the ground holds, and for each other member what stands for those that carry it: what
 /// stands is held at its foot, what lies under both ends.
-fn supports(members: &[Detail], on_ground: &[bool]) -> String {
+fn supports(members: &[Detail], standing: &[Standing]) -> String {
     let mut text = String::from(
         "    // The ground holds what stands on it. The others are carried: their supports, `alone`, hold them only\n    // where each is computed by itself; `analyze --whole` leaves those out and follows the loads down.\n    supports: [\n",
     );
-    for (Detail { found, .. }, on_ground) in members.iter().zip(on_ground) {
+    let on_ground = on_ground(standing);
+    for ((Detail { found, .. }, on_ground), stands) in members.iter().zip(on_ground).zip(standing) {
         let id = quoted(&found.id);
-        let alone = if *on_ground { "" } else { ", alone: true" };
+        let alone = if on_ground { "" } else { ", alone: true" };
         let mut hold = |place: &str, how: &str| {
             let _ = writeln!(text, "        (member: {id}, place: {place}, hold: {how}{alone}),");
         };
@@ -444,7 +447,10 @@ fn supports(members: &[Detail], on_ground: &[bool]) -> String {
             for end in ["Start", "End"] {
                 hold(end, &how);
             }
-        } else if found.kind == MemberKind::Footing || found.lies_on_ground {
+        } else if found.kind == MemberKind::Footing
+            || found.lies_on_ground
+            || is_blinding(standing, stands)
+        {
             hold("Bottom", "Springs(stiffness_mpa_m: (20, 50, 20), lifts: true)");
         } else if level {
             hold("Surface(from: 0, to: 0.1, side_deg: 180)", "Fixed");
@@ -481,6 +487,7 @@ fn place(source: &Source, built: &Built) -> Georeference {
             northings: map.northings,
             height: map.height,
             x_axis: [map.abscissa.unwrap_or(1.0), map.ordinate.unwrap_or(0.0)],
+            scale: map.scale.unwrap_or(1.0),
         }),
         latitude_deg: found.latitude,
         longitude_deg: found.longitude,
@@ -497,12 +504,13 @@ fn georeference(source: &Source, built: &Built) -> String {
     let mut fields = vec![format!("offset_m: {}", numbers(&place.offset_m))];
     if let Some(map) = &place.map {
         fields.push(format!(
-            "map: (crs: {:?}, eastings: {}, northings: {}, height: {}, x_axis: {})",
+            "map: (crs: {:?}, eastings: {}, northings: {}, height: {}, x_axis: {}, scale: {})",
             map.crs,
             map.eastings,
             map.northings,
             map.height,
-            numbers(&map.x_axis)
+            numbers(&map.x_axis),
+            map.scale
         ));
     }
     let rest = [
@@ -538,7 +546,7 @@ fn whereabouts(source: &Source, built: &Built) -> Vec<String> {
     }
     if let (Some(latitude), Some(longitude)) = (place.latitude_deg, place.longitude_deg) {
         let height = place.elevation_m.map_or(String::new(), |e| format!(", {e} m"));
-        lines.push(format!("the site is at {latitude:.6}° N, {longitude:.6}° E{height}"));
+        lines.push(format!("the site is at {}{height}", words(latitude, longitude)));
     }
     lines
 }
@@ -558,6 +566,8 @@ fn summary(folder: &Path, source: &Source, built: &Built, members: &[Detail]) ->
     }
     let count = |what: Assumed| members.iter().filter(|m| m.assumed.contains(&what)).count();
     let mut notes: Vec<String> = source.notes.iter().chain(&built.notes).cloned().collect();
+    let standing = standing(built);
+    notes.extend(questions(built, &standing, &on_ground(&standing)));
     let others: BTreeMap<&str, (usize, &Matter)> =
         built.found.iter().filter_map(|f| f.other.as_ref()).fold(BTreeMap::new(), |mut m, o| {
             m.entry(o.name.as_str()).or_insert((0, o)).0 += 1;
@@ -587,7 +597,7 @@ fn summary(folder: &Path, source: &Source, built: &Built, members: &[Detail]) ->
     // A glTF file's own reader may have said it.
     let is_told = notes.iter().any(|note| note.contains("no structural members"));
     if built.found.is_empty() && !is_told {
-        notes.push("no structural members were found: name nodes COL_…, BEAM_…, SLAB_…, WALL_…, FOOTING_…, LINING_…".into());
+        notes.push(no_members(source, built));
     }
     Imported {
         folder: folder.into(),
@@ -602,6 +612,17 @@ fn summary(folder: &Path, source: &Source, built: &Built, members: &[Detail]) ->
         offset_m: built.offset.to_array(),
         notes,
     }
+}
+
+/// Where nothing is a member: what the format needs for one.
+fn no_members(source: &Source, built: &Built) -> String {
+    if source.is_ifc {
+        return format!(
+            "no structural members were found among {}: IFC says them by class (IfcColumn, IfcBeam, IfcSlab, IfcWall, IfcFooting …): export with these, or say what a body is by --kind \"NAME=beam\"",
+            listed(&built.scenery)
+        );
+    }
+    "no structural members were found: name nodes COL_…, BEAM_…, SLAB_…, WALL_…, FOOTING_…, LINING_…".into()
 }
 
 /// Which members have no bars, and why.
@@ -698,7 +719,7 @@ fn rules(
 - **Age** of {}: {YEARS} years.\n\
 - **Reinforcement** of {}: the least that EN 1992-1-1 allows, {STEEL}: beams §9.2.1.1 and §9.2.2, slabs and footings §9.3.1.1, columns §9.5.2 and §9.5.3, walls and linings §9.6, piles §9.8.5; cover of table 4.4N (structural class S4) and Δc_dev = 10 mm. Bars are straight, and slant as their member tapers; where they would not lie in it, as in an arch, none are assumed, and Remarks say so. Real members have more: their bars are what to look for first.\n\
 - **Steel grade** of {} bars: {STEEL}.\n\
-- **Supports**: the ground holds footings, approach and base slabs by predefined type or name (springs of 50 MPa/m), tunnels (springs of 40 MPa/m), columns and walls that nothing reaches up to, and the lowest slabs (at their ends: a deck that is modelled alone lies on none). Every other member is held for itself, `alone`, what stands at its foot, what lies under both ends; the whole (`analyze --whole`) leaves those supports out. **Loads**: {}.\n",
+- **Supports**: the ground holds footings, approach and base slabs by predefined type or name (springs of 50 MPa/m), tunnels (springs of 40 MPa/m), columns and walls that nothing reaches up to, slabs right below a footing, and the lowest slabs (at their ends: a deck that is modelled alone lies on none). Every other member is held for itself, `alone`, what stands at its foot, what lies under both ends; the whole (`analyze --whole`) leaves those supports out. **Loads**: {}.\n",
         imported.concrete_assumed,
         count(Assumed::Exposure),
         count(Assumed::Age),

@@ -52,9 +52,103 @@ fn directions(surface: &Surface) -> Vec<(DVec3, f64)> {
     found
 }
 
+/// So much smaller the box along the longest extent must be than that along faces, to be the better
+/// one.
+const TIGHTER: f64 = 0.9;
+
+/// The box of a body: along its faces, or along its longest extent where that is the tighter one, as
+/// of what tapers or is bent in plan, whose largest faces run askew.
+pub(super) fn boxed(surface: &Surface) -> Option<Box3> {
+    let of_faces = boxed_by_faces(surface)?;
+    let volume = |b: &Box3| b.size.iter().product::<f64>();
+    let of_extent = boxed_by_extent(surface);
+    let tighter = of_extent.filter(|b| volume(b) < TIGHTER * volume(&of_faces));
+    Some(tighter.unwrap_or(of_faces))
+}
+
+/// The box along the direction in which a surface extends most, upright across it.
+fn boxed_by_extent(surface: &Surface) -> Option<Box3> {
+    let (mut area, mut sum) = (0.0, DVec3::ZERO);
+    let origin = surface.points.first().copied()?;
+    let mut moments = glam::DMat3::ZERO;
+    for corners in surface.faces() {
+        let [a, b, c] = corners.map(|p| p - origin);
+        let own = 0.5 * (b - a).cross(c - a).length();
+        let s = a + b + c;
+        area += own;
+        sum += own * s / 3.0;
+        // ∫ x xᵀ over a triangle.
+        for v in [a, b, c, s] {
+            moments += glam::DMat3::from_cols(v * v.x, v * v.y, v * v.z) * (own / 12.0);
+        }
+    }
+    let mean = sum / area.max(1e-12);
+    moments -= glam::DMat3::from_cols(mean * mean.x, mean * mean.y, mean * mean.z) * area;
+    let mut along = DVec3::new(1.0, 0.9, 0.8);
+    for _ in 0..100 {
+        along = (moments * along).try_normalize()?;
+    }
+    let up = if along.y.abs() < 0.9 { DVec3::Y } else { DVec3::Z };
+    framed(surface, along, up.reject_from(along).try_normalize()?)
+}
+
+/// The box along two directions and the one across both.
+fn framed(surface: &Surface, x: DVec3, y: DVec3) -> Option<Box3> {
+    let unit = [x, y, x.cross(y)];
+    let spans = unit.map(|u| surface.span(u));
+    let middle = |i: usize| 0.5 * (spans[i][0] + spans[i][1]) * unit[i];
+    let centre = middle(0) + middle(1) + middle(2);
+    centre.is_finite().then(|| Box3 { centre, unit, size: spans.map(|[l, h]| h - l) })
+}
+
+/// Sections across a member that are looked at.
+const SECTIONS: usize = 9;
+
+/// Height and width of a member's section, m, towards its zero and across that: those of the section
+/// in the middle of all by size, since slope along the axis is no depth.
+pub(super) fn across(surface: &Surface, frame: Frame) -> [f64; 2] {
+    let axis = frame.axis.as_dvec3();
+    let along = axis.normalize_or_zero();
+    let ways = [frame.zero, frame.ninety()].map(|v| v.as_dvec3());
+    let [mut heights, mut widths]: [Vec<f64>; 2] = Default::default();
+    for k in 0..SECTIONS {
+        let at = frame.start.as_dvec3() + axis * ((k as f64 + 0.5) / SECTIONS as f64);
+        let mut spans = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
+        for corners in surface.faces() {
+            let off = corners.map(|p| (p - at).dot(along));
+            for (i, j) in [(0, 1), (1, 2), (2, 0)] {
+                if (off[i] > 0.0) != (off[j] > 0.0) {
+                    let p = corners[i].lerp(corners[j], off[i] / (off[i] - off[j]));
+                    for (span, way) in spans.iter_mut().zip(ways) {
+                        *span = [span[0].min(p.dot(way)), span[1].max(p.dot(way))];
+                    }
+                }
+            }
+        }
+        if spans[0][1] > spans[0][0] && spans[1][1] > spans[1][0] {
+            heights.push(spans[0][1] - spans[0][0]);
+            widths.push(spans[1][1] - spans[1][0]);
+        }
+    }
+    let whole = ways.map(|way| surface.span(way)).map(|[low, high]| high - low);
+    [(heights, whole[0]), (widths, whole[1])].map(|(mut found, whole)| {
+        found.sort_by(f64::total_cmp);
+        found.get(found.len() / 2).copied().unwrap_or(whole)
+    })
+}
+
+/// Mean depth of a plate, m, of its volume over the area that it covers seen along `way`: crossfall
+/// is no depth.
+pub(super) fn mean_depth(surface: &Surface, way: DVec3) -> Option<f64> {
+    let seen = |[a, b, c]: [DVec3; 3]| 0.5 * (b - a).cross(c - a).dot(way).abs();
+    let area = 0.5 * surface.faces().map(seen).sum::<f64>();
+    let depth = surface.volume() / area;
+    (depth > 0.0 && depth.is_finite()).then_some(depth)
+}
+
 /// The box along the largest faces that stand at right angles to each other; upright where nothing
 /// speaks against it.
-pub(super) fn boxed(surface: &Surface) -> Option<Box3> {
+fn boxed_by_faces(surface: &Surface) -> Option<Box3> {
     let found = directions(surface);
     let first = found.first()?.0;
     let second = found.iter().map(|d| d.0).find(|d| d.dot(first).abs() < ACROSS);
@@ -65,12 +159,7 @@ pub(super) fn boxed(surface: &Surface) -> Option<Box3> {
         near.unwrap_or(v)
     };
     let x = tidy(first);
-    let y = tidy(second.reject_from(x).try_normalize()?);
-    let unit = [x, y, x.cross(y)];
-    let spans = unit.map(|u| surface.span(u));
-    let middle = |i: usize| 0.5 * (spans[i][0] + spans[i][1]) * unit[i];
-    let centre = middle(0) + middle(1) + middle(2);
-    centre.is_finite().then(|| Box3 { centre, unit, size: spans.map(|[l, h]| h - l) })
+    framed(surface, x, tidy(second.reject_from(x).try_normalize()?))
 }
 
 impl Box3 {
@@ -204,6 +293,37 @@ mod tests {
         );
         let frame = found.frame(MemberKind::Beam);
         assert!((frame.axis.length() - 8.0).abs() < 1e-4 && frame.zero.y > 0.9, "{frame:?}");
+    }
+
+    /// A girder whose web tapers from .6 to 1.6 m over 30 m and rises by 4 %: its largest faces run
+    /// askew, and its slope is no depth.
+    #[test]
+    fn a_tapered_girder_in_a_slope_is_as_wide_as_its_section() {
+        let mesh = crate::parametric::solid::cells(&[-0.5, 0.5], &[-0.7, 0.7], |_, _| true, 30.0);
+        let mut girder = surface(&mesh, DQuat::IDENTITY, DVec3::ZERO);
+        let z = girder.span(DVec3::Z);
+        for p in &mut girder.points {
+            let along = (p.z - z[0]) / (z[1] - z[0]);
+            p.x = if p.x > 0.0 { 0.3 + along } else { -0.3 };
+            p.y += 0.04 * p.z;
+        }
+        let found = boxed(&girder).unwrap();
+        let frame = found.frame(MemberKind::Beam);
+        let [height, width] = across(&girder, frame);
+        assert!((height - 1.4).abs() < 0.03 && (width - 1.1).abs() < 0.06, "{height} {width}");
+        let slope = frame.axis.y.abs() / frame.axis.length();
+        assert!((slope - 0.04).abs() < 0.01, "{slope}");
+    }
+
+    /// A deck 10 m wide and .3 m thick that falls by 2.5 % to both sides.
+    #[test]
+    fn crossfall_is_no_depth() {
+        let mesh =
+            crate::parametric::solid::cells(&[-5.0, 0.0, 5.0], &[0.0, 0.3], |_, _| true, 20.0);
+        let mut deck = surface(&mesh, DQuat::IDENTITY, DVec3::ZERO);
+        deck.points.iter_mut().for_each(|p| p.y -= 0.025 * p.x.abs());
+        let depth = mean_depth(&deck, DVec3::Y).unwrap();
+        assert!((depth - 0.3).abs() < 1e-6, "{depth}");
     }
 
     #[test]

@@ -13,6 +13,7 @@ use crate::{Frame, MemberKind, Part};
 pub(super) struct Source {
     /// What was read, and by what.
     pub(super) format: String,
+    pub(super) is_ifc: bool,
     /// Name of the project.
     pub(super) project: String,
     /// When it was built.
@@ -37,7 +38,7 @@ pub(super) struct Georeference {
     pub(super) elevation: Option<f64>,
 }
 
-/// IfcMapConversion, m.
+/// IfcMapConversion: as its file says it, in m once it is resolved.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
 pub(super) struct MapConversion {
     /// Name of the coordinate reference system, as of EPSG.
@@ -52,6 +53,12 @@ pub(super) struct MapConversion {
     pub(super) abscissa: Option<f64>,
     #[serde(default)]
     pub(super) ordinate: Option<f64>,
+    /// From units of the project to those of the map; of the map alone once it is resolved.
+    #[serde(default)]
+    pub(super) scale: Option<f64>,
+    /// Of the map, where it has a unit of its own.
+    #[serde(default)]
+    pub(super) metres_per_unit: Option<f64>,
 }
 
 /// One element of the file.
@@ -76,6 +83,8 @@ pub(super) struct Element {
     pub(super) colour: Option<Vec3>,
     /// What the model itself says (`extras.intrados`), which is not asked again.
     pub(super) said: Option<Said>,
+    /// What is said where its file has its body more than once.
+    pub(super) twice: Option<String>,
     /// Objects of the model that the surface came from, where there is one.
     pub(super) objects: Vec<usize>,
 }
@@ -145,9 +154,14 @@ impl Surface {
 
     /// Volume enclosed, by the divergence theorem about a point of its own, m³.
     pub(super) fn volume(&self) -> f64 {
+        self.signed_volume().abs()
+    }
+
+    /// The same, below zero where faces look inward.
+    pub(super) fn signed_volume(&self) -> f64 {
         let origin = self.points.first().copied().unwrap_or_default();
         let sixfold = |[a, b, c]: [DVec3; 3]| (a - origin).dot((b - origin).cross(c - origin));
-        (self.faces().map(sixfold).sum::<f64>() / 6.0).abs()
+        self.faces().map(sixfold).sum::<f64>() / 6.0
     }
 
     /// Corners of its box.

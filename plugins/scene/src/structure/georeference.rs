@@ -43,6 +43,13 @@ pub struct MapOrigin {
     /// East and north of the model's x axis, of any length.
     #[serde(default = "east")]
     pub x_axis: [f64; 2],
+    /// Metres on the map per metre of the model, as of a projection's scale there.
+    #[serde(default = "one")]
+    pub scale: f64,
+}
+
+fn one() -> f64 {
+    1.0
 }
 
 fn east() -> [f64; 2] {
@@ -69,6 +76,7 @@ impl Georeference {
     ///     northings: 5e6,
     ///     height: 100.0,
     ///     x_axis: [0.0, 2.0],
+    ///     scale: 1.0,
     /// };
     /// let place = Georeference { map: Some(map), ..Georeference::default() };
     /// let at = place.on_map(Vec3::new(3.0, 2.0, -1.0)).unwrap();
@@ -79,7 +87,7 @@ impl Georeference {
         let map = self.map.as_ref()?;
         let at = self.in_model(point);
         let length = map.x_axis[0].hypot(map.x_axis[1]);
-        let [cos, sin] = map.x_axis.map(|c| c / length);
+        let [cos, sin] = map.x_axis.map(|c| map.scale * c / length);
         let (x, y) = (at.x, -at.z);
         Some([
             map.eastings + cos * x - sin * y,
