@@ -469,7 +469,11 @@ fn pile_doubts(images: &[PathBuf], voxel_mm: Option<[f32; 3]>) -> Option<String>
     let mut doubts = reader.doubts().to_vec();
     // What a given size answers is no question any more.
     if voxel.is_some() {
-        let is_asked = |d: &String| d.ends_with("give the edge of a pixel") || d.contains(" mm apart") || d.ends_with("give voxel_mm");
+        let is_asked = |d: &String| {
+            d.ends_with("give the edge of a pixel")
+                || d.contains(" mm apart")
+                || d.ends_with("give voxel_mm")
+        };
         doubts.retain(|d| !is_asked(d));
     }
     (!doubts.is_empty()).then(|| doubts.join("; "))
@@ -579,11 +583,13 @@ fn fits(
             length(wide),
             length(diagonal)
         )),
-        Some(core) if !ACROSS.contains(&(thin / core)) && !SHORT.contains(&(wide / core)) => unfit(format!(
-            "what it shows is {} across and the core {}: is pixel_mm or diameter_mm wrong?",
-            length(thin),
-            length(core)
-        )),
+        Some(core) if !ACROSS.contains(&(thin / core)) && !SHORT.contains(&(wide / core)) => {
+            unfit(format!(
+                "what it shows is {} across and the core {}: is pixel_mm or diameter_mm wrong?",
+                length(thin),
+                length(core)
+            ))
+        }
         _ => Ok(()),
     }
 }

@@ -36,7 +36,9 @@ pub struct DecodeLimits {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum DecodeError {
     /// No pixels, or too many.
-    #[error("is {0} × {1} pixels; 1 to {2} each way and at most {3} million are read: make it smaller")]
+    #[error(
+        "is {0} × {1} pixels; 1 to {2} each way and at most {3} million are read: make it smaller"
+    )]
     Size(u64, u64, u64, u64),
     /// More pixels than its bytes can hold.
     #[error("says {0} × {1} pixels and is only {2} bytes long: its header is damaged")]
@@ -111,7 +113,8 @@ mod tests {
     #[test]
     fn sizes_are_checked_before_memory() {
         let limits = DecodeLimits { side: 1000, pixels: 500_000 };
-        let size = |width, height, file_bytes| PictureSize { width, height, pixel_bytes: 2, file_bytes };
+        let size =
+            |width, height, file_bytes| PictureSize { width, height, pixel_bytes: 2, file_bytes };
         assert_eq!(size(500, 1000, 500).check(&limits), Ok(()));
         let cases = [
             (size(0, 5, 99), "is 0 × 5 pixels"),

@@ -45,7 +45,8 @@ pub fn markers(bytes: &[u8]) -> Option<JpegMarkers> {
             0x01 | 0xd0..=0xd8 => continue,
             _ => {}
         }
-        let Some(length) = bytes.get(at..at + 2).map(|b| usize::from(b[0]) << 8 | usize::from(b[1]))
+        let Some(length) =
+            bytes.get(at..at + 2).map(|b| usize::from(b[0]) << 8 | usize::from(b[1]))
         else {
             return found;
         };

@@ -265,9 +265,8 @@ fn header(path: &Path) -> Result<Header, VolumeError> {
         [y, x] if x > 0.0 && y > 0.0 => Some([x, y]),
         _ => None,
     };
-    let first = |tag: Tag| {
-        of_frame(parts(0), MEASURES, tag).first().copied().filter(|v: &f64| *v > 0.0)
-    };
+    let first =
+        |tag: Tag| of_frame(parts(0), MEASURES, tag).first().copied().filter(|v: &f64| *v > 0.0);
     let frames = (0..count as usize).map(|number| {
         let value = |tag: Tag| of_frame(parts(number), TRANSFORMATION, tag).first().copied();
         Frame {

@@ -328,9 +328,8 @@ pub(super) fn resolution(pages: &mut Pages) -> Option<Resolution> {
     if !edges.iter().all(|e| e.is_finite() && *e > 0.0) {
         return None;
     }
-    let usual = |edge: f64| {
-        USUAL_DPI.into_iter().find(|dots| (edge * dots / 0.0254 - 1.0).abs() < 2e-3)
-    };
+    let usual =
+        |edge: f64| USUAL_DPI.into_iter().find(|dots| (edge * dots / 0.0254 - 1.0).abs() < 2e-3);
     match edges.map(usual) {
         [Some(dots), Some(_)] => Some(Resolution::Default(dots)),
         _ => Some(Resolution::Edges(edges)),
