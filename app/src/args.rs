@@ -1133,9 +1133,9 @@ pub(crate) struct Photo {
     /// Unroll this member alone; all that are seen if absent
     #[arg(long, value_name = "MEMBER")]
     pub(crate) member: Option<String>,
-    /// Of the maps, mm a pixel
-    #[arg(long, value_name = "MM", default_value_t = 1.0, value_parser = mm_per_px)]
-    pub(crate) mm_per_px: f64,
+    /// Of the maps, mm a pixel; 1 if absent
+    #[arg(long, value_name = "MM", value_parser = mm_per_px)]
+    pub(crate) mm_per_px: Option<f64>,
     /// Folder with cameras.txt and images.txt of COLMAP: photographs that are in it stand where it
     /// says, in the frame of three or more places that are picked in two of them
     #[arg(long, value_name = "DIR", requires = "pose")]
@@ -1170,6 +1170,13 @@ pub(crate) struct Photo {
     /// Folder for the files
     #[arg(long, value_name = "DIR", default_value = "out")]
     pub(crate) out: PathBuf,
+}
+
+impl Photo {
+    /// Of the maps, mm a pixel.
+    pub(crate) fn mm_per_px(&self) -> f64 {
+        self.mm_per_px.unwrap_or(1.0)
+    }
 }
 
 /// Which light is taken off a photograph.

@@ -168,10 +168,12 @@ fn photograph(args: &args::Attach, picks: &Path) -> Result<What, Failure> {
             "a photograph is attached alone: give one command to each".into(),
         ));
     };
-    Photograph::open(file).map_err(|error| {
+    let photograph = Photograph::open(file).map_err(|error| {
         let line = format!("{}: {error}", file.display());
         if error.is_missing() { Failure::NoInput(line) } else { Failure::BadInput(line) }
     })?;
+    let name = file.display();
+    photograph.doubts.iter().for_each(|doubt| tracing::warn!("{name}: {doubt}"));
     Ok(What::Photograph { files: [file.clone(), picks.to_owned()], focal_px: of.focal_px })
 }
 

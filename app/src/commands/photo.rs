@@ -92,6 +92,8 @@ struct Corners {
     member: String,
     /// m.
     corners: Vec<[f64; 3]>,
+    /// Names of the faces that meet at each.
+    faces: Vec<Vec<String>>,
 }
 
 /// What every photograph of a run is placed with.
@@ -138,7 +140,7 @@ pub(crate) fn run(session: &Session, args: &args::Photo) -> Result<Outcome, Fail
         let line = format!("two photographs are called {}: give one another name", twice.1);
         return Err(Failure::Usage(line));
     }
-    let known = |photo: &String| names.contains(photo);
+    let known = |photo: &String| names.iter().any(|name| picks::is_same_photo(photo, name));
     if let Some(other) = work.picks.photos().find(|p| !known(p)) {
         tracing::warn!("picks in {other:?} are not used: no such photograph is given");
     }
@@ -206,17 +208,20 @@ fn corners(
     let index = index_of(scene, member)?;
     let outline = site.surface(index).map(intrados_photo::face::Surface::outline);
     let corners = outline.unwrap_or_default().corners;
+    let faces = site.surface(index).map(|s| corners.iter().map(|c| s.faces_at(*c)).collect());
     let report = Corners {
         schema: "intrados.corners/1",
         scene: scene.name.clone(),
         member: scene.members[index].id.clone(),
         corners: corners.iter().map(DVec3::to_array).collect(),
+        faces: faces.unwrap_or_default(),
     };
     session.print(&report, || {
-        let mut rows = vec![["corner", "x m", "y m", "z m"].map(String::from).to_vec()];
-        for (number, corner) in (1..).zip(&report.corners) {
+        let mut rows = vec![["corner", "x m", "y m", "z m", "faces"].map(String::from).to_vec()];
+        for (number, (corner, faces)) in (1..).zip(report.corners.iter().zip(&report.faces)) {
             let numbers = corner.map(|x| format!("{:.4}", x + 0.0));
-            rows.push([number.to_string()].into_iter().chain(numbers).collect());
+            let cells = [number.to_string()].into_iter().chain(numbers);
+            rows.push(cells.chain([faces.join(", ")]).collect());
         }
         output::table(&rows)
     })?;
@@ -237,10 +242,17 @@ impl Work<'_> {
         for note in &photograph.notes {
             tracing::info!("{name}: {note}");
         }
+        for doubt in &photograph.doubts {
+            tracing::warn!("{name}: {doubt}");
+        }
         let picks = self.picks.of(name, self.args.files.len() == 1, &photograph);
         let located = self
             .locate(&photograph, name, &picks)
             .map_err(|error| Failure::BadInput(bad(&error)))?;
+        let rolled: Vec<String> = photograph.on_its_side(&located.pose).into_iter().collect();
+        for doubt in &rolled {
+            tracing::warn!("{name}: {doubt}");
+        }
         if located.other.is_some() {
             tracing::warn!(
                 "{name}: another place of the camera fits nearly as well: pick a point out of the plane of the others"
@@ -270,7 +282,7 @@ impl Work<'_> {
                 surface,
                 &seen.face,
                 (&photograph, &located.pose),
-                self.args.mm_per_px,
+                self.args.mm_per_px(),
                 &self.session.job,
             )?;
             let error = self.site.error(&located, &seen.middle);
@@ -279,7 +291,7 @@ impl Work<'_> {
             let mut record = FaceRecord::new([id, &seen.face.name], &seen.middle, error, &map);
             if let Some(relit) = &relit {
                 let job = &self.session.job;
-                let map = relit.map(&self.site, seen, shot, self.args.mm_per_px, job)?;
+                let map = relit.map(&self.site, seen, shot, self.args.mm_per_px(), job)?;
                 self.write_relit(files, &map, &stem, name)?;
                 record = record.relit(&map);
                 kept.keep([id, &seen.face.name], name, map);
@@ -291,7 +303,7 @@ impl Work<'_> {
             file_hash: hash(file)?,
             size: photograph.size,
             taken: photograph.taken.clone(),
-            notes: photograph.notes.clone(),
+            notes: [&photograph.notes[..], &photograph.doubts, &rolled].concat(),
             pose: PoseRecord::new(&located, &picks),
             faces,
             relit: relit.as_ref().map(intrados_photo::relight::Relit::record),
@@ -311,6 +323,9 @@ impl Work<'_> {
             Some(located) if located.pose.size == photograph.size => return Ok(located),
             Some(_) => tracing::warn!(
                 "{name}: COLMAP saw it in another size, or before it was turned upright: its own picks place it"
+            ),
+            None if self.series.is_some() => tracing::warn!(
+                "{name}: COLMAP's images.txt does not name it, or names two of its name: its own picks place it"
             ),
             None => {}
         }

@@ -11,7 +11,7 @@ use intrados_stage::{
     file::{Set, file_name, file_names},
 };
 use intrados_xray::{
-    correct::{Stripes, remove_stripes},
+    correct::{Stripes, mend_dead_bins, no_integrals, remove_stripes, sinogram_doubts},
     recon::{self, Window, fbp, nrmse_in},
     scan::{
         Acquisition, Corrections, Counts, Detector, Drawing, Forming, Known, Protocol, Restored,
@@ -476,6 +476,7 @@ fn given(session: &Session, args: &args::Scan, path: &Path) -> Result<Outcome, F
         session.job.relabel(format!("reading {place}"));
         let mut sinogram =
             Sinogram::read(&mut reader, &orbit, by_row, recon::rows(&orbit, &part), &session.job)?;
+        doubted(path, &mut sinogram, args.given.arc_deg.is_some(), first == 0)?;
         if made.rings {
             without_stripes(&mut sinogram, session)?;
         }
@@ -506,6 +507,36 @@ fn given(session: &Session, args: &args::Scan, path: &Path) -> Result<Outcome, F
     let mut report = Report::new(&path.display().to_string(), None, args, &orbit, made);
     report.cpu_seconds = cpu_seconds() - begin;
     report.finish(session, files)
+}
+
+/// Refuses what are no line integrals, mends dead bins, and says what speaks against the first rows.
+fn doubted(
+    path: &Path,
+    sinogram: &mut Sinogram,
+    is_arc_given: bool,
+    is_first: bool,
+) -> Result<(), Failure> {
+    let name = path.display();
+    if let Some(why) = no_integrals(sinogram) {
+        return Err(Failure::BadInput(format!("{name}: {why}")));
+    }
+    let dead = mend_dead_bins(sinogram);
+    if !is_first {
+        return Ok(());
+    }
+    if let Some(bin) = dead.first() {
+        let others = match dead.len() - 1 {
+            0 => String::new(),
+            n => format!(" and {n} more"),
+        };
+        tracing::warn!(
+            "{name}: bin {bin}{others} reads the same in every view and is dead: it gets the mean of its neighbours, or a ring would show"
+        );
+    }
+    for doubt in sinogram_doubts(sinogram, is_arc_given) {
+        tracing::warn!("{name}: {doubt}");
+    }
+    Ok(())
 }
 
 /// Refuses slices that take too much memory with their rays.
@@ -584,7 +615,8 @@ fn drawn(
         slices = Grid::centred([size, size, slices.size[2]], [edge, edge, slices.voxel[2]]);
     }
     bearable(&protocol.orbit, &slices)?;
-    let sinogram = Sinogram::read(&mut reader, &protocol.orbit, by_row, 0..rows, &session.job)?;
+    let mut sinogram = Sinogram::read(&mut reader, &protocol.orbit, by_row, 0..rows, &session.job)?;
+    doubted(path, &mut sinogram, true, true)?;
     let counts = Counts::by_sheet(&protocol);
     let known = Known { protocol, drawing, slices };
     let scatter_map =

@@ -9,7 +9,10 @@ use base64::{Engine, engine::general_purpose::STANDARD};
 
 use image::ImageDecoder;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use intrados_stage::access;
+use intrados_stage::{
+    access,
+    decode::{DecodeLimits, PictureSize, decode},
+};
 use serde::{Deserialize, Serialize};
 
 use crate::{crack::Crack, detect::Detection};
@@ -54,26 +57,41 @@ pub const MISSED: [u8; 3] = [170, 40, 190];
 const SIDE: usize = 520;
 /// Longest side of a photograph that is unpacked, pixels.
 const MOST_SIDE: u32 = 20_000;
+/// Most pixels of one.
+const MOST_PIXELS: u64 = 120_000_000;
 /// That of the pictures of single cracks.
 const SMALL: usize = 150;
 
 impl Picture {
-    /// Reads a photograph (JPEG, PNG), its longer side at most `side` pixels. None where it is
+    /// Reads a photograph (JPEG, PNG), its longer side at most `side` pixels. `None` where it is
     /// missing, damaged, or too large to be unpacked.
     #[must_use]
     pub fn read(path: &Path, side: u32) -> Option<Self> {
-        let (file, _) = access::open(path).ok()?;
-        let mut reader =
-            image::ImageReader::new(BufReader::new(file)).with_guessed_format().ok()?;
-        let mut limits = image::Limits::default();
-        limits.max_image_width = Some(MOST_SIDE);
-        limits.max_image_height = Some(MOST_SIDE);
-        reader.limits(limits);
-        let mut decoder = reader.into_decoder().ok()?;
-        let turned = decoder.orientation().ok();
-        let mut whole = image::DynamicImage::from_decoder(decoder).ok()?;
-        turned.into_iter().for_each(|turn| whole.apply_orientation(turn));
-        let small = whole.thumbnail(side, side).to_rgb8();
+        let (file, length) = access::open(path).ok()?;
+        let header = || {
+            let mut reader =
+                image::ImageReader::new(BufReader::new(file)).with_guessed_format().ok()?;
+            let mut limits = image::Limits::default();
+            limits.max_image_width = Some(MOST_SIDE);
+            limits.max_image_height = Some(MOST_SIDE);
+            reader.limits(limits);
+            let decoder = reader.into_decoder().ok()?;
+            let (width, height) = decoder.dimensions();
+            let [width, height] = [width, height].map(u64::from);
+            // A pixel may be a bit of a byte.
+            let file_bytes = 8 * length;
+            Some((PictureSize { width, height, pixel_bytes: 1, file_bytes }, decoder))
+        };
+        let pixels = |mut decoder: Box<dyn ImageDecoder>| {
+            let turned = decoder.orientation().ok();
+            let mut whole = image::DynamicImage::from_decoder(decoder).ok()?;
+            turned.into_iter().for_each(|turn| whole.apply_orientation(turn));
+            Some(whole.thumbnail(side, side).to_rgb8())
+        };
+        let limits = DecodeLimits { side: u64::from(MOST_SIDE), pixels: MOST_PIXELS };
+        let header = || header().map(|(size, decoder)| (size, Box::new(decoder) as Box<_>));
+        let read = decode(&limits, || header().ok_or(()), |d| pixels(d).ok_or(()), |_| ());
+        let small = read.ok()?;
         let [width, height] = [small.width(), small.height()].map(|n| n as usize);
         Some(Self { width, height, rgb: small.into_raw(), caption: String::new() })
     }

@@ -7,7 +7,7 @@ use std::{
 };
 
 use intrados_stage::Job;
-use intrados_xray::volume::{Reader, VolumeError};
+use intrados_xray::volume::{Reader, VolumeError, without_padding};
 use serde::{Deserialize, Serialize};
 
 use intrados_raster::grid::{Grid, Mask};
@@ -96,18 +96,26 @@ impl Slices {
         [0, 1].map(|k| self.reader.grid().size[k] as f64 * f64::from(self.pixel_mm))
     }
 
-    /// What the file says of its pixels where that contradicts what was given, in words.
+    /// What the user should know before the file counts, in words: what it says of its pixels where
+    /// that contradicts what was given, and what is assumed of it.
     #[must_use]
-    pub(crate) fn contradiction(&self) -> Option<String> {
-        let [x, _] = told_mm(&self.reader).filter(|_| self.pixel_from == PixelFrom::Given)?;
-        let differs = (x / self.pixel_mm - 1.0).abs() > SAME;
-        differs.then(|| {
-            format!(
+    pub(crate) fn doubt(&self) -> Option<String> {
+        let mut all = self.reader.doubts().to_vec();
+        let given = |_: &[f32; 2]| self.pixel_from == PixelFrom::Given;
+        if let Some([x, _]) = told_mm(&self.reader).filter(given)
+            && (x / self.pixel_mm - 1.0).abs() > SAME
+        {
+            all.push(format!(
                 "{}: its own tags say {x} mm a pixel, not the {} mm that were given and count",
                 self.path.display(),
                 self.pixel_mm
-            )
-        })
+            ));
+        }
+        // What a given edge answers is no question any more.
+        if self.pixel_from == PixelFrom::Given {
+            all.retain(|doubt| !doubt.ends_with("give the edge of a pixel"));
+        }
+        (!all.is_empty()).then(|| all.join("; "))
     }
 
     /// How many there are.
@@ -133,10 +141,18 @@ impl Slices {
     }
 
     /// Reads slice `z`, which is called after the file, and its number where there are several.
+    /// Padding around a round field of view becomes air.
     ///
     /// # Errors
     /// There is no such slice, or it is damaged or holds a value that is not finite.
     pub fn read(&mut self, z: usize) -> Result<Slice, VolumeError> {
+        let mut slice = self.read_as_it_is(z)?;
+        without_padding(&mut slice.grey.data, slice.grey.width);
+        Ok(slice)
+    }
+
+    /// Reads slice `z` with what lies outside the field of view of its scanner.
+    fn read_as_it_is(&mut self, z: usize) -> Result<Slice, VolumeError> {
         let volume = self.reader.read_slab(z..z + 1, &Job::default())?;
         let [width, height, _] = volume.grid.size;
         let name =
@@ -175,7 +191,7 @@ pub(crate) fn read_masks_at(
 ) -> Result<Mask, VolumeError> {
     let mut united = Mask::new(slice.grey.width, slice.grey.height, false);
     for path in paths {
-        let mask = Slices::open(path, slice.pixel_mm)?.read(z)?.grey.map(|v| v != 0.0);
+        let mask = Slices::open(path, slice.pixel_mm)?.read_as_it_is(z)?.grey.map(|v| v != 0.0);
         if !mask.fits(&united) {
             let (w, h) = (united.width, united.height);
             return Err(VolumeError::bad(

@@ -331,8 +331,17 @@ impl SliceSource {
     /// What the file's own tags say of its pixels against the scene.
     #[must_use]
     pub fn doubt(&self) -> Option<String> {
-        let What::File { image, pixel_mm, .. } = &self.what else { return None };
-        slice::Slices::open(image, *pixel_mm).ok()?.contradiction()
+        let (image, pixel_mm) = match &self.what {
+            What::File { image, pixel_mm, .. } => (image, pixel_mm),
+            What::Stack { images, voxel_mm, plane, .. } => {
+                // Said once of all sections.
+                return (Plane::all().first() == Some(plane))
+                    .then(|| pile_doubts(images, *voxel_mm))
+                    .flatten();
+            }
+            What::Drawn(_) | What::Scanned(_) => return None,
+        };
+        slice::Slices::open(image, *pixel_mm).ok()?.doubt()
     }
 
     /// What its section was designed as, where a slice of this size shows all of it.
@@ -368,11 +377,14 @@ impl SliceSource {
             What::File { image, masks, pixel_mm, .. } => {
                 let longest = self.longest_mm(scene);
                 let mut file = opened(scene, self.member, image, *pixel_mm, longest)?;
-                doubt = file.contradiction();
+                doubt = file.doubt();
                 let (slice, labels) = pixels(&mut file, masks)?;
                 (slice, labels.map(Known::Labels))
             }
             What::Stack { images, voxel_mm, plane, drilled } => {
+                if Plane::all().first() == Some(plane) {
+                    doubt = pile_doubts(images, *voxel_mm);
+                }
                 let volume = (Arc::clone(images), *voxel_mm);
                 let fits = || self.piled(scene, images, *voxel_mm);
                 let sections = shelf.sections(scene, &volume, fits, job)?;
@@ -450,6 +462,23 @@ impl SliceSource {
     }
 }
 
+/// What the user should know of a volume before it counts.
+fn pile_doubts(images: &[PathBuf], voxel_mm: Option<[f32; 3]>) -> Option<String> {
+    let voxel = voxel_mm.map(|edges| edges.map(|mm| 1e-3 * f64::from(mm)));
+    let reader = Reader::pile(images.to_vec(), voxel).ok()?;
+    let mut doubts = reader.doubts().to_vec();
+    // What a given size answers is no question any more.
+    if voxel.is_some() {
+        let is_asked = |d: &String| {
+            d.ends_with("give the edge of a pixel")
+                || d.contains(" mm apart")
+                || d.ends_with("give voxel_mm")
+        };
+        doubts.retain(|d| !is_asked(d));
+    }
+    (!doubts.is_empty()).then(|| doubts.join("; "))
+}
+
 impl Known {
     /// Pores and cracks.
     #[must_use]
@@ -488,6 +517,10 @@ const WIDEST: [f64; 2] = [4.0, 1.2];
 /// What a core shows across, over its diameter: slices along its axis cut it off its middle, too.
 const ACROSS: std::ops::RangeInclusive<f64> = 0.5..=1.15;
 
+/// What a core shows that is shorter than half its diameter, the long way, over its diameter: a slice
+/// along its axis shows its length the thin way.
+const SHORT: std::ops::RangeInclusive<f64> = 0.8..=1.15;
+
 /// A file of slices whose header is sound, and whose pixels are of a size that a picture of this
 /// member can have.
 fn opened(
@@ -502,9 +535,11 @@ fn opened(
     let picture = slices.sides_mm().into_iter().fold(0.0, f64::max);
     let section = widest_mm(scene, member).unwrap_or(f64::INFINITY).max(longest.unwrap_or(0.0));
     match () {
-        () if slices.pixel_from() == PixelFrom::Nobody => unfit(
-            "neither the scene nor the file says how large its pixels are: add pixel_mm".to_owned(),
-        ),
+        () if slices.pixel_from() == PixelFrom::Nobody => unfit(match slices.doubt() {
+            Some(doubt) => format!("how large are its pixels? add pixel_mm ({doubt})"),
+            None => "neither the scene nor the file says how large its pixels are: add pixel_mm"
+                .to_owned(),
+        }),
         () if picture > WIDEST[0] * section => unfit(format!(
             "the picture is {} wide and the member {}: pixel_mm in µm?",
             length(picture),
@@ -548,11 +583,13 @@ fn fits(
             length(wide),
             length(diagonal)
         )),
-        Some(core) if !ACROSS.contains(&(thin / core)) => unfit(format!(
-            "what it shows is {} across and the core {}: is pixel_mm or diameter_mm wrong?",
-            length(thin),
-            length(core)
-        )),
+        Some(core) if !ACROSS.contains(&(thin / core)) && !SHORT.contains(&(wide / core)) => {
+            unfit(format!(
+                "what it shows is {} across and the core {}: is pixel_mm or diameter_mm wrong?",
+                length(thin),
+                length(core)
+            ))
+        }
         _ => Ok(()),
     }
 }

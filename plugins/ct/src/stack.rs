@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use intrados_scene::AxisRuns;
 use intrados_stage::Job;
-use intrados_xray::volume::{Grid as Voxels, Reader, VolumeError};
+use intrados_xray::volume::{Grid as Voxels, Reader, VolumeError, without_padding};
 
 use intrados_raster::Grid;
 
@@ -94,7 +94,8 @@ pub(crate) fn sections(
     }
     for z in 0..grid.size[2] {
         job.step(z, grid.size[2])?;
-        let layer = reader.read_slab(z..z + 1, &Job::default())?.data;
+        let mut layer = reader.read_slab(z..z + 1, &Job::default())?.data;
+        without_padding(&mut layer, grid.size[0]);
         cuts.iter_mut().for_each(|cut| cut.take(z, &layer, grid.size[0]));
     }
     let name = reader.path().file_name().unwrap_or_default().to_string_lossy().into_owned();
@@ -156,7 +157,8 @@ fn axes(normal: Normal) -> [usize; 2] {
 /// The box of what is not air, as the slice in the middle shows it, and all of the pile.
 fn extent(reader: &mut Reader) -> Result<Extent, VolumeError> {
     let [width, height, depth] = reader.grid().size;
-    let layer = reader.read_slab(depth / 2..depth / 2 + 1, &Job::default())?.data;
+    let mut layer = reader.read_slab(depth / 2..depth / 2 + 1, &Job::default())?.data;
+    without_padding(&mut layer, width);
     // Concrete fills more than a tenth of a picture; half of its grey divides it from air.
     let mut sorted = layer.clone();
     let tenth = sorted.len() - 1 - sorted.len() / 10;

@@ -58,7 +58,7 @@ impl Picks {
     #[must_use]
     pub fn of(&self, name: &str, is_only: bool, photograph: &Photograph) -> Vec<Pick> {
         let is_of = |photo: &Option<String>, unnamed: bool| {
-            photo.as_ref().map_or(unnamed, |photo| photo == name)
+            photo.as_ref().map_or(unnamed, |photo| is_same_photo(photo, name))
         };
         let picked = self.picked.iter().filter(|p| is_of(&p.photo, is_only)).map(|p| p.pick);
         let tags = self.tags.iter().filter(|tag| is_of(&tag.photo, true));
@@ -70,6 +70,21 @@ impl Picks {
         let tags = self.tags.iter().filter_map(|tag| tag.photo.as_ref());
         self.picked.iter().filter_map(|p| p.photo.as_ref()).chain(tags)
     }
+}
+
+/// Whether a table that says `named` means the photograph `file`: folders do not count, nor does
+/// case, in which tables and cameras differ.
+///
+/// ```
+/// use intrados_photo::picks::is_same_photo;
+/// assert!(is_same_photo("images/IMG_1.JPG", "img_1.jpg"));
+/// assert!(is_same_photo("C:\\photos\\a.jpg", "a.jpg"));
+/// assert!(!is_same_photo("b.jpg", "bb.jpg"));
+/// ```
+#[must_use]
+pub fn is_same_photo(named: &str, file: &str) -> bool {
+    let [named, file] = [named, file].map(|name| name.rsplit(['/', '\\']).next().unwrap_or(name));
+    named.to_lowercase() == file.to_lowercase()
 }
 
 /// Why a table of picks is not read.
@@ -101,7 +116,8 @@ pub enum PicksError {
 /// A row of a tag has `tag` (its number in the family 36h11), `size_mm` (the edge of its black
 /// square), `member`, `face`, `along` (its middle, 0 to 1 of the axis), `across_mm` (to the right
 /// of the axis as one stands before the face; 0 where absent), and `turn_deg` where it does not
-/// stand upright along the axis (anticlockwise).
+/// stand upright along the axis (anticlockwise). Cells are divided by commas, semicolons or tabs;
+/// with the latter two, numbers may have a decimal comma.
 ///
 /// # Errors
 /// [`PicksError`]: file, line and remedy.
@@ -118,29 +134,78 @@ pub fn read(path: &Path, scene: &Scene, site: &Site) -> Result<Picks, PicksError
 type Fault = (Option<u64>, String);
 
 fn parse(bytes: &[u8], scene: &Scene, site: &Site) -> Result<Picks, Fault> {
-    let mut reader =
-        csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(bytes);
+    let text = text_of(bytes);
+    let comma = delimiter(&text);
+    let mut reader = csv::ReaderBuilder::new()
+        .trim(csv::Trim::All)
+        .comment(Some(b'#'))
+        .delimiter(comma)
+        .from_reader(text.as_bytes());
     let said = |error: csv::Error| {
         (error.position().map(csv::Position::line), format!("is no table of commas: {error}"))
     };
-    let head = reader.headers().map_err(said)?.clone();
-    let known = |name: &str| COLUMNS.contains(&name.trim_start_matches('\u{feff}'));
-    if let Some(name) = head.iter().find(|name| !known(name)) {
+    let head = reader.headers().map_err(said)?.iter().map(str::to_lowercase).collect();
+    let head: csv::StringRecord = head;
+    if let Some(name) = head.iter().find(|name| !COLUMNS.contains(name)) {
         let all = COLUMNS.join(", ");
         return Err((Some(1), format!("column {name:?} is not known: the columns are {all}")));
+    }
+    if let Some(twice) = COLUMNS.iter().find(|c| head.iter().filter(|h| h == *c).count() > 1) {
+        return Err((Some(1), format!("column {twice:?} is there twice: leave out one")));
     }
     let mut picks = Picks::default();
     for cells in reader.records() {
         let cells = cells.map_err(said)?;
         let line = cells.position().map(csv::Position::line);
-        let row = Row { head: &head, cells: &cells };
+        let row = Row { head: &head, cells: &cells, is_comma_decimal: comma != b',' };
         let put = match row.cell("tag") {
             Some(tag) => row.tag(tag, scene, site).and_then(|tag| picks.place(tag)),
             None => row.pick(scene, site).map(|pick| picks.picked.push(pick)),
         };
         put.map_err(|what| (line, what))?;
     }
-    Ok(picks)
+    match far(&picks, scene) {
+        Some(what) => Err((None, what)),
+        None => Ok(picks),
+    }
+}
+
+/// The text of a table without the mark of its order of bytes; what is no UTF-8 is Latin-1, as
+/// spreadsheets write it.
+fn text_of(bytes: &[u8]) -> String {
+    let text = match std::str::from_utf8(bytes) {
+        Ok(text) => text.to_owned(),
+        Err(_) => bytes.iter().map(|byte| char::from(*byte)).collect(),
+    };
+    text.trim_start_matches('\u{feff}').to_owned()
+}
+
+/// What divides the cells: what the head's line has most of.
+fn delimiter(text: &str) -> u8 {
+    let is_head = |line: &&str| !line.trim().is_empty() && !line.starts_with('#');
+    let head = text.lines().find(is_head).unwrap_or_default();
+    let count = |mark: u8| head.bytes().filter(|b| *b == mark).count();
+    // Of equal counts the last: a comma.
+    [b'\t', b';', b','].into_iter().max_by_key(|mark| count(*mark)).unwrap_or(b',')
+}
+
+/// Why the places are not those of this scene: most lie farther from it than it is large. A camera
+/// fits places in millimetres as well, a thousand times as far away.
+fn far(picks: &Picks, scene: &Scene) -> Option<String> {
+    let [low, high] = scene.bounds().map(glam::Vec3::as_dvec3);
+    let size = (high - low).length();
+    let off = |place: &DVec3| place.distance(place.clamp(low, high));
+    let is_far = |place: &&DVec3| off(place) > 1.0 + size;
+    let places: Vec<DVec3> = picks.picked.iter().map(|picked| picked.pick.place).collect();
+    let first = places.iter().find(is_far)?;
+    if 2 * places.iter().filter(is_far).count() <= places.len() {
+        return None;
+    }
+    let [x, y, z] = first.to_array();
+    Some(format!(
+        "a place at ({x}, {y}, {z}) m lies {:.0} m from the scene, which is {size:.1} m large: are its coordinates in mm or cm, or another frame's? Give them in the scene's m",
+        off(first)
+    ))
 }
 
 impl Picks {
@@ -159,17 +224,23 @@ impl Picks {
 struct Row<'a> {
     head: &'a csv::StringRecord,
     cells: &'a csv::StringRecord,
+    /// Whether a comma may stand before decimals.
+    is_comma_decimal: bool,
 }
 
 impl Row<'_> {
     fn cell(&self, name: &str) -> Option<&str> {
-        let column = self.head.iter().position(|h| h.trim_start_matches('\u{feff}') == name)?;
+        let column = self.head.iter().position(|h| h == name)?;
         self.cells.get(column).filter(|cell| !cell.is_empty())
     }
 
     fn number(&self, name: &str) -> Result<f64, String> {
         let text = self.cell(name).ok_or_else(|| format!("{name} is missing"))?;
-        let value = text.parse::<f64>().ok().filter(|x| x.is_finite());
+        let dotted = match self.is_comma_decimal && !text.contains('.') {
+            true => text.replacen(',', ".", 1),
+            false => text.to_owned(),
+        };
+        let value = dotted.parse::<f64>().ok().filter(|x| x.is_finite());
         value.ok_or_else(|| format!("{name} {text:?} is no number"))
     }
 

@@ -2,15 +2,20 @@
 
 use std::{
     fs::File,
-    io::{self, BufReader, Read, Seek, SeekFrom},
+    io::{self, BufReader, Cursor, Read, Seek, SeekFrom},
     path::Path,
 };
 
 use glam::Vec3;
 use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits, metadata::Orientation};
-use intrados_stage::access::{self, Denied};
+use intrados_stage::{
+    access::{self, Denied},
+    decode::{self, DecodeError, DecodeLimits, PictureSize},
+};
+use zune_core::{bytestream::ZCursor, options::DecoderOptions};
+use zune_jpeg::JpegDecoder;
 
-use crate::taken::Taken;
+use crate::{pose::Pose, taken::Taken};
 
 /// Most pixels of a photograph: 720 MB with sixteen bits a colour.
 const MOST_PIXELS: u64 = 120_000_000;
@@ -18,6 +23,9 @@ const MOST_PIXELS: u64 = 120_000_000;
 const LONGEST: u64 = 1 << 30;
 /// Fewest pixels across or down.
 const FEWEST: u32 = 16;
+
+/// A camera that is turned by more than this about its axis held the picture on its side.
+const ON_ITS_SIDE_DEG: f64 = 60.0;
 
 /// Why a photograph is not read. Each reads on from the file's name.
 #[derive(Debug, thiserror::Error)]
@@ -36,6 +44,12 @@ pub enum PictureError {
     /// What its decoder says.
     #[error("cannot be read: {0}: export it again, as JPEG, PNG or TIFF")]
     Damaged(String),
+    /// Its end is missing: a decoder would fill in grey what is not there.
+    #[error("is cut short: the end of the JPEG is missing; copy it again")]
+    CutShort,
+    /// The guard of all decoders.
+    #[error(transparent)]
+    Guard(#[from] DecodeError),
 }
 
 impl PictureError {
@@ -61,6 +75,10 @@ pub struct Photograph {
     pub taken: Taken,
     /// What a user should know: that it says nothing, or that its colours are no sRGB.
     pub notes: Vec<String>,
+    /// What speaks against it: that it was cropped, or is damaged within.
+    pub doubts: Vec<String>,
+    /// How it was turned to stand upright, as EXIF numbers it; 1: not at all.
+    pub orientation: u8,
     samples: Samples,
     /// Linear light of every value of a sample.
     linear: Vec<f32>,
@@ -100,13 +118,19 @@ impl Photograph {
         }
         let mut file = BufReader::new(file);
         recognise(&mut file, path)?;
-        let (taken, orientation, mut notes) = Taken::read(&mut file);
+        let read = || Ok::<_, PictureError>(Taken::read(&mut file));
+        let (taken, orientation, mut notes) = decode::guarded(read, PictureError::from)?;
         file.rewind()?;
-        let mut picture = decode(file)?;
+        let mut bytes = Vec::new();
+        file.read_to_end(&mut bytes)?;
+        let mut picture = decode(&bytes)?;
+        let mut doubts: Vec<String> = damage(&bytes).into_iter().collect();
+        drop(bytes);
         if let Some(orientation) = orientation.and_then(Orientation::from_exif) {
             picture.apply_orientation(orientation);
         }
         let size = [picture.width(), picture.height()];
+        doubts.extend(taken.cropped(size));
         if picture.color().has_alpha() {
             notes.push("its transparency is left out".into());
         }
@@ -131,7 +155,23 @@ impl Photograph {
             Samples::Sixteen(_) => u16::MAX,
         };
         let linear = (0..=most).map(|value| linear(f32::from(value) / f32::from(most))).collect();
-        Ok(Self { size, taken, notes, samples, linear })
+        let orientation = orientation.unwrap_or(1);
+        Ok(Self { size, taken, notes, doubts, orientation, samples, linear })
+    }
+
+    /// What speaks against a camera that took it lying on its side: pixels that were picked before
+    /// it was turned upright fit it perfectly. `None` where it was held upright.
+    #[must_use]
+    pub fn on_its_side(&self, pose: &Pose) -> Option<String> {
+        let roll = pose.roll_deg().filter(|roll| roll.abs() > ON_ITS_SIDE_DEG)?;
+        let [width, height] = self.size;
+        let why = match self.orientation {
+            1 => "was it turned after it was picked, or is another side of it up?".to_owned(),
+            _ => format!(
+                "its EXIF turns it upright; were its pixels picked before? Count them in the upright picture, {width} × {height}"
+            ),
+        };
+        Some(format!("the picks fit a camera that lies on its side (rolled by {roll:.0}°): {why}"))
     }
 
     /// Steps of a value in the file from black to white.
@@ -175,26 +215,58 @@ impl Photograph {
     }
 }
 
-/// Decodes within bounds of size and memory.
-fn decode(file: BufReader<File>) -> Result<DynamicImage, PictureError> {
+/// Decodes behind the guard of all decoders.
+fn decode(bytes: &[u8]) -> Result<DynamicImage, PictureError> {
     let damaged = |error: image::ImageError| PictureError::Damaged(error.to_string());
-    let mut reader = ImageReader::new(file).with_guessed_format()?;
-    if !matches!(reader.format(), Some(ImageFormat::Jpeg | ImageFormat::Png | ImageFormat::Tiff)) {
-        return Err(PictureError::Kind("no JPEG, PNG or TIFF", "export it as one of these"));
+    let header = || {
+        let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format()?;
+        let known = [ImageFormat::Jpeg, ImageFormat::Png, ImageFormat::Tiff];
+        if !reader.format().is_some_and(|format| known.contains(&format)) {
+            return Err(PictureError::Kind("no JPEG, PNG or TIFF", "export it as one of these"));
+        }
+        let mut limits = Limits::default();
+        limits.max_alloc = Some(8 * MOST_PIXELS + (64 << 20));
+        reader.limits(limits);
+        let decoder = reader.into_decoder().map_err(damaged)?;
+        let (width, height) = decoder.dimensions();
+        if width.min(height) < FEWEST || u64::from(width) * u64::from(height) > MOST_PIXELS {
+            return Err(PictureError::Size(width, height));
+        }
+        let printed = [image::ExtendedColorType::Cmyk8, image::ExtendedColorType::Cmyk16];
+        if printed.contains(&decoder.original_color_type()) {
+            return Err(cmyk());
+        }
+        let [width, height] = [width, height].map(u64::from);
+        // A pixel may be a bit of a byte.
+        let file_bytes = 8 * bytes.len() as u64;
+        Ok((PictureSize { width, height, pixel_bytes: 1, file_bytes }, decoder))
+    };
+    let limits = DecodeLimits { side: u64::from(u32::MAX), pixels: MOST_PIXELS };
+    let pixels = |decoder| DynamicImage::from_decoder(decoder).map_err(damaged);
+    let picture = decode::decode(&limits, header, pixels, PictureError::from)?;
+    match decode::jpeg::markers(bytes) {
+        Some(markers) if !markers.is_whole => Err(PictureError::CutShort),
+        _ => Ok(picture),
     }
-    let mut limits = Limits::default();
-    limits.max_alloc = Some(8 * MOST_PIXELS + (64 << 20));
-    reader.limits(limits);
-    let decoder = reader.into_decoder().map_err(damaged)?;
-    let (width, height) = decoder.dimensions();
-    if width.min(height) < FEWEST || u64::from(width) * u64::from(height) > MOST_PIXELS {
-        return Err(PictureError::Size(width, height));
-    }
-    let printed = [image::ExtendedColorType::Cmyk8, image::ExtendedColorType::Cmyk16];
-    if printed.contains(&decoder.original_color_type()) {
-        return Err(cmyk());
-    }
-    DynamicImage::from_decoder(decoder).map_err(damaged)
+}
+
+/// What a strict decoder of JPEG finds wrong in what a lenient one fills in; `None` where nothing
+/// is, or it is no JPEG.
+fn damage(bytes: &[u8]) -> Option<String> {
+    decode::jpeg::markers(bytes)?;
+    let options = DecoderOptions::default()
+        .set_strict_mode(true)
+        .set_max_width(usize::from(u16::MAX))
+        .set_max_height(usize::from(u16::MAX));
+    let decode = || {
+        let mut decoder = JpegDecoder::new_with_options(ZCursor::new(bytes), options);
+        decoder.decode().map(drop).map_err(|error| error.to_string())
+    };
+    let why = decode::guarded(decode, |why| why.to_string()).err()?;
+    let why: String = why.split_whitespace().collect::<Vec<_>>().join(" ");
+    Some(format!(
+        "its JPEG data are damaged ({why}): a part of it may be filled in grey; copy it again"
+    ))
 }
 
 fn cmyk() -> PictureError {

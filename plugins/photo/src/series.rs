@@ -10,7 +10,12 @@ use intrados_scene::Lens;
 use intrados_stage::access::{self, Denied};
 use nalgebra::{Matrix3, Vector3};
 
-use crate::{Located, Pick, Pose, picks::PickedIn, pose::Covariance, similarity::Similarity};
+use crate::{
+    Located, Pick, Pose,
+    picks::{PickedIn, is_same_photo},
+    pose::Covariance,
+    similarity::Similarity,
+};
 
 /// Longest of COLMAP's files, bytes.
 const LONGEST: u64 = 1 << 28;
@@ -88,7 +93,7 @@ impl Series {
     pub fn placed(&self, picks: &[PickedIn]) -> Result<PlacedSeries, SeriesError> {
         let mut by_place: Vec<(DVec3, Vec<(&Pose, &Pick)>)> = Vec::new();
         for picked in picks {
-            let pose = picked.photo.as_ref().and_then(|photo| self.poses.get(photo));
+            let pose = picked.photo.as_ref().and_then(|photo| found(&self.poses, photo));
             let Some(pose) = pose else { continue };
             let place = picked.pick.place;
             match by_place.iter_mut().find(|(known, _)| *known == place) {
@@ -128,7 +133,7 @@ impl PlacedSeries {
     /// out. `None` of a photograph that is not in it.
     #[must_use]
     pub fn located(&self, photo: &str, picks: &[Pick]) -> Option<Located> {
-        let pose = *self.poses.get(photo)?;
+        let pose = *found(&self.poses, photo)?;
         let d = Vector3::from((pose.position - self.middle).to_array());
         let turn = self.inertia.try_inverse()? * self.variance;
         // θ × d = −[d]× θ; a turn of the world by θ turns the camera's axes by −R θ.
@@ -160,6 +165,17 @@ impl PlacedSeries {
             edges: None,
         })
     }
+}
+
+/// The pose of a photograph by its name; COLMAP's may begin with folders, as long as no other one
+/// is called the same.
+fn found<'a>(poses: &'a BTreeMap<String, Pose>, photo: &str) -> Option<&'a Pose> {
+    if let Some(pose) = poses.get(photo) {
+        return Some(pose);
+    }
+    let mut all = poses.iter().filter(|(name, _)| is_same_photo(name, photo));
+    let (_, pose) = all.next()?;
+    all.next().is_none().then_some(pose)
 }
 
 /// The point nearest to all rays; `None` of one, or of parallel ones.

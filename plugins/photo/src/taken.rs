@@ -10,6 +10,10 @@ const FILM_DIAGONAL_MM: f64 = 43.266_615;
 /// Standard error of a focal length from EXIF, as a share: equivalents are rounded to millimetres,
 /// makers take them by the diagonal or by the width, and focusing changes them (ours).
 const USUAL_ERROR: f64 = 0.03;
+/// That of a picture that was cropped: its optical axis no longer falls on its middle (ours).
+const CROPPED_ERROR: f64 = 0.1;
+/// Proportions that differ by no more than this share are the same, rounded.
+const SAME: f64 = 0.02;
 
 /// What a photograph says of itself; each as far as it says so.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
@@ -28,6 +32,8 @@ pub struct Taken {
     pub f_number: Option<f64>,
     /// Sensitivity, ISO.
     pub iso: Option<f64>,
+    /// Pixels of the picture that the camera took, the longer side first.
+    pub camera_px: Option<[f64; 2]>,
 }
 
 /// A focal length in pixels.
@@ -43,7 +49,17 @@ impl Taken {
     /// Reads EXIF, and the orientation that it says; and what a user should know of it. A picture
     /// without any, or with a damaged one, is fine.
     pub(crate) fn read(file: &mut (impl BufRead + Seek)) -> (Self, Option<u8>, Vec<String>) {
-        let exif = match Reader::new().read_from_container(file) {
+        let mut notes = Vec::new();
+        // Some writers leave out the end of a list; what stands before it is sound.
+        let read = Reader::new().continue_on_error(true).read_from_container(file);
+        let read = read.or_else(|error| {
+            error.distill_partial_result(|faults| {
+                if let Some(fault) = faults.first() {
+                    notes.push(format!("a part of its EXIF cannot be read: {fault}"));
+                }
+            })
+        });
+        let exif = match read {
             Ok(exif) => exif,
             Err(exif::Error::NotFound(_)) => {
                 let said = "it has no EXIF: its focal length is found from the picks";
@@ -65,8 +81,10 @@ impl Taken {
             exposure_s: positive(Tag::ExposureTime),
             f_number: positive(Tag::FNumber),
             iso: positive(Tag::PhotographicSensitivity),
+            camera_px: positive(Tag::PixelXDimension)
+                .zip(positive(Tag::PixelYDimension))
+                .map(|(x, y)| [x.max(y), x.min(y)]),
         };
-        let mut notes = Vec::new();
         if taken.focal_35mm.is_none() {
             notes.push("its EXIF has no focal length as of 35 mm film: the picks find it".into());
         }
@@ -78,7 +96,8 @@ impl Taken {
     }
 
     /// The focal length for a whole picture of this size, by the diagonal (CIPA DCG-001); `None`
-    /// where nothing is said. Of a part that was cut out it is wrong.
+    /// where nothing is said. Of a part that was cut out it is that of the whole, where EXIF says how
+    /// large that was, with a larger error.
     ///
     /// ```
     /// use intrados_photo::taken::Taken;
@@ -88,8 +107,34 @@ impl Taken {
     #[must_use]
     pub fn focal(&self, size: [u32; 2]) -> Option<Focal> {
         let [width, height] = size.map(f64::from);
-        let px = self.focal_35mm? / FILM_DIAGONAL_MM * width.hypot(height);
-        Some(Focal { px, rel_error: USUAL_ERROR })
+        let whole = self.camera_px.filter(|_| self.is_cropped(size));
+        let diagonal = match whole {
+            // Cut out and scaled, too, or turned by a few degrees: it says nothing.
+            Some([long, short]) if width.max(height) > long || width.min(height) > short => {
+                return None;
+            }
+            Some([long, short]) => long.hypot(short),
+            None => width.hypot(height),
+        };
+        let px = self.focal_35mm? / FILM_DIAGONAL_MM * diagonal;
+        let rel_error = if whole.is_some() { CROPPED_ERROR } else { USUAL_ERROR };
+        Some(Focal { px, rel_error })
+    }
+
+    /// Whether a picture of this size has other proportions than the one that the camera took.
+    fn is_cropped(&self, size: [u32; 2]) -> bool {
+        let [width, height] = size.map(f64::from);
+        let ours = width.max(height) / width.min(height);
+        self.camera_px.is_some_and(|[long, short]| (long / short / ours - 1.0).abs() > SAME)
+    }
+
+    /// What a user should know of a picture of this size that was cropped.
+    pub(crate) fn cropped(&self, size: [u32; 2]) -> Option<String> {
+        let [long, short] = self.camera_px.filter(|_| self.is_cropped(size))?;
+        let [width, height] = size;
+        Some(format!(
+            "its EXIF says that the camera took {long} × {short} pixels and it has {width} × {height}: it was cropped, so that its optical axis may not fall on its middle; place it by the whole picture"
+        ))
     }
 }
 

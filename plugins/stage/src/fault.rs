@@ -2,6 +2,7 @@
 
 use std::{
     any::Any,
+    cell::Cell,
     collections::VecDeque,
     panic::{AssertUnwindSafe, catch_unwind, set_hook, take_hook},
     sync::{Mutex, Once, PoisonError},
@@ -22,6 +23,19 @@ pub struct Fault {
 static LAST: Mutex<VecDeque<Fault>> = Mutex::new(VecDeque::new());
 /// How many of them: those of other threads may come in between.
 const KEPT: usize = 64;
+
+thread_local! {
+    /// Whether a panic of this thread is expected and said by whoever catches it.
+    static QUIET: Cell<bool> = const { Cell::new(false) };
+}
+
+/// [`catch`] of what may panic on a damaged file: the panic itself prints nothing.
+pub(crate) fn catch_quietly<T>(work: impl FnOnce() -> T) -> Result<T, Fault> {
+    let before = QUIET.replace(true);
+    let done = catch(work);
+    QUIET.set(before);
+    done
+}
 
 /// Does `work`; a panic in it becomes a [`Fault`]. What `work` was changing may be half changed
 /// then: use nothing of it that does not say otherwise.
@@ -64,7 +78,10 @@ fn listen() {
                 last.pop_front();
             }
             drop(last);
-            usual(panic);
+            // A thread that is just ending has no such flag any more.
+            if !QUIET.try_with(Cell::get).unwrap_or(false) {
+                usual(panic);
+            }
         }));
     });
 }

@@ -3,6 +3,7 @@
 pub mod access;
 mod clock;
 pub mod csv;
+pub mod decode;
 mod estimate;
 mod fault;
 pub mod file;

@@ -103,7 +103,11 @@ pub fn placed(
     let picks = picks(photo, &photograph, scene, &site)?;
     let prior = prior(photo, &photograph);
     let located = site.locate(&photograph, &picks, &prior).map_err(because)?;
-    Ok((photograph, site, located))
+    // What EXIF has turned upright no upright camera shows on its side.
+    match photograph.on_its_side(&located.pose).filter(|_| photograph.orientation != 1) {
+        Some(why) => Err(because(why)),
+        None => Ok((photograph, site, located)),
+    }
 }
 
 /// What photographs show of a member.

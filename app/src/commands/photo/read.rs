@@ -174,6 +174,11 @@ pub(super) fn bare(session: &Session, args: &args::Photo) -> Result<Outcome, Fai
         );
         return Err(Failure::Usage(line));
     }
+    if args.mm_per_px.is_some() {
+        let line =
+            "--mm-per-px goes with a scene: without one, photographs are read in their own pixels";
+        return Err(Failure::Usage(line.into()));
+    }
     let names: Vec<String> = all.iter().map(|p| stem(p)).collect();
     let mut files = output::begin(&args.out)?;
     let mut photos = Vec::new();
@@ -199,6 +204,8 @@ fn stem(path: &Path) -> String {
 
 fn one(session: &Session, path: &Path, stem: &str, files: &mut Set) -> Result<Marked, Failure> {
     let photograph = super::open(path)?;
+    let name = path.display();
+    photograph.doubts.iter().for_each(|doubt| tracing::warn!("{name}: {doubt}"));
     let [w, h] = photograph.size;
     let at = |i: u32| photograph.light(i % w, i / w).unwrap_or(Vec3::ZERO);
     let data: Vec<Vec3> = (0..w * h).map(at).collect();

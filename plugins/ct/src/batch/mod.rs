@@ -163,7 +163,7 @@ pub fn detect_files<E: From<SliceError> + From<WriteError>>(
                 continue;
             }
         };
-        notes.extend(layers.contradiction());
+        notes.extend(layers.doubt());
         for layer in 0..layers.count() {
             let share = |layer: usize| {
                 (n as f64 + layer as f64 / layers.count() as f64) / files.len() as f64

@@ -166,6 +166,19 @@ impl Discrete {
         Some(Self { cdf, probability, guide, total })
     }
 
+    /// Whether what was stored can choose: no search leaves its tables.
+    #[must_use]
+    pub(crate) fn is_consistent(&self) -> bool {
+        let n = self.probability.len();
+        n > 0
+            && self.cdf.len() == n + 1
+            && self.guide.len() == n
+            && self.guide.iter().all(|i| (*i as usize) < n)
+            && self.cdf.first() == Some(&0.0)
+            && self.cdf.last().is_some_and(|last| *last > BELOW_ONE)
+            && self.cdf.windows(2).all(|c| c[0] <= c[1])
+    }
+
     /// Sum of the weights.
     #[must_use]
     pub(crate) fn total(&self) -> f64 {

@@ -71,6 +71,10 @@ impl Guide {
         self.charts = Arc::clone(lit.charts());
         let fits = self.readings.len() == sensors.len() + 1
             && self.gains.len() == sensors.len()
+            && self.lamps.as_ref().is_none_or(|lamps| {
+                let all = lit.choice.as_ref().map(Discrete::len);
+                lamps.is_consistent() && all == Some(lamps.len())
+            })
             && self.fields.iter().all(|field| field.fits(2 * self.charts.len()));
         fits.then_some(self)
     }

@@ -272,12 +272,37 @@ impl LightField {
         sum
     }
 
-    /// A number that tells fields apart.
-    /// Whether it has a root for each of so many sides of charts, or is empty.
+    /// Whether it has a root for each of so many sides of charts, or is empty; and whether all that
+    /// is numbered in it is there, so that no walk leaves its tables or goes round in its trees.
     fn fits(&self, sides: usize) -> bool {
-        self.cells.is_empty() || self.roots.len() >= sides
+        let is_there = |first: u32, count: usize, all: usize| {
+            (first as usize).checked_add(count).is_some_and(|end| end <= all)
+        };
+        let nodes = self.nodes.len();
+        // Trees are built from their roots on.
+        let is_node = |(i, node): (usize, &Node)| match node {
+            Node::Leaf(cell) => *cell == NONE || is_there(*cell, 1, self.cells.len()),
+            Node::Split { axis, left, right, .. } => {
+                let is_below = |next: &u32| *next as usize > i && is_there(*next, 1, nodes);
+                *axis < 3 && is_below(left) && is_below(right)
+            }
+        };
+        let is_cell = |cell: &Cell| {
+            is_there(cell.gate, (cell.lobes as usize).div_ceil(WIDE), self.gates.len())
+                && is_there(cell.pack, cell.packs as usize, self.packs.len())
+                && (cell.haze == NONE || is_there(cell.haze, 1, self.hazes.len()))
+        };
+        let is_root = |root: &u32| *root == NONE || is_there(*root, 1, nodes);
+        let is_gate = |g: &Gates| g.lobe.iter().all(|lobe| is_there(*lobe, 1, self.lobes.len()));
+        (self.cells.is_empty() || self.roots.len() >= sides)
+            && self.owners.len() == self.packs.len()
+            && self.roots.iter().all(is_root)
+            && self.nodes.iter().enumerate().all(is_node)
+            && self.cells.iter().all(is_cell)
+            && (self.lobes.is_empty() || self.gates.iter().all(is_gate))
     }
 
+    /// A number that tells fields apart.
     fn fingerprint(&self) -> u64 {
         let spots = self.packs.iter().flat_map(|pack| pack.fingerprint());
         guide::blake(

@@ -99,6 +99,15 @@ impl Pose {
         [axes.x_axis, axes.y_axis, axes.z_axis]
     }
 
+    /// By how much the camera is turned about its optical axis from upright, degrees, −180 to 180:
+    /// positive where the picture's up leans to the left of the world's. `None` where it looks up or
+    /// down so steeply that none is upright.
+    #[must_use]
+    pub fn roll_deg(&self) -> Option<f64> {
+        let [right, down, forward] = self.axes();
+        (forward.y.abs() < 0.9).then(|| right.y.atan2(-down.y).to_degrees())
+    }
+
     /// Where the optical axis meets the picture, pixels.
     fn middle(&self) -> [f64; 2] {
         let [width, height] = self.size.map(f64::from);

@@ -45,7 +45,7 @@ use crate::{
     file::{
         Slices,
         evidence::{self, EvidenceFile, MemberSlices, Photo, Record, Survey, no_member},
-        extension, is_image, listing, matches, nearest, shorten,
+        extension, is_image, listing, matches, mhd, nearest, shorten,
     },
     load::PROJECT,
     problem::unwritten,
@@ -541,9 +541,10 @@ impl Project {
                 test: test.clone(),
             }),
             What::Slices { files, pixel_mm, cut } => {
+                let copies: Vec<PathBuf> = files.iter().map(|f| copied_as(f, None)).collect();
                 let slices = Slices::Files {
                     name: name.to_owned(),
-                    images: patterns(files, at)?,
+                    images: patterns(&copies, at)?,
                     pixel_mm: *pixel_mm,
                     along: what.middle(),
                     angle_deg: what.angle(&scene.members[member])?,
@@ -619,6 +620,10 @@ impl Project {
         for file in files {
             access::open(file).map_err(|why| AttachError::denied(file, &why))?;
             bare.iter().try_for_each(|(raw, _)| raw.check(file))?;
+            if bare.is_none() && mhd::is_header(file) {
+                let data = mhd::VoxelHeader::read(file).map_err(|why| not_read(file, &why))?.data;
+                access::open(&data).map_err(|why| AttachError::denied(&data, &why))?;
+            }
             if !names.insert(plain_name(file)?) {
                 let why = "another file of this name is attached with it: rename one of them";
                 return Err(AttachError::BadInput(format!("{}: {why}", file.display())));
@@ -638,6 +643,9 @@ impl Project {
             let to = aside.path().join(plain_name(&copied_as(file, bare.map(|b| b.0)))?);
             file::put(&to, |out| match bare {
                 Some((raw, voxel_mm)) => raw.write(file, voxel_mm, out),
+                None if mhd::is_header(file) => mhd::VoxelHeader::read(file)
+                    .map_err(io::Error::other)?
+                    .write(file.parent().unwrap_or(Path::new("")), out),
                 None => io::copy(&mut from, out).map(drop),
             })
             .map_err(failed)?;
@@ -896,9 +904,13 @@ fn images(slices: &MemberSlices) -> impl Iterator<Item = &String> {
     })
 }
 
-/// What a copy of a file is called: bare voxels get a header, and its ending.
+fn not_read(file: &Path, why: &str) -> AttachError {
+    AttachError::BadInput(format!("{}: {why}", file.display()))
+}
+
+/// What a copy of a file is called: bare voxels get a header, a header its voxels, and its ending.
 fn copied_as(file: &Path, raw: Option<&Raw>) -> PathBuf {
-    if raw.is_some() { file.with_extension("mha") } else { file.to_owned() }
+    if raw.is_some() || mhd::is_header(file) { file.with_extension("mha") } else { file.to_owned() }
 }
 
 /// Edges of bare voxels, mm, which somebody has to say.

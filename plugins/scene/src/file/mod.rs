@@ -19,6 +19,7 @@ mod doubt;
 pub mod evidence;
 mod image;
 mod member;
+pub(crate) mod mhd;
 mod obj;
 pub mod reference;
 mod resolve;

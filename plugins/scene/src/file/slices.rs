@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use intrados_stage::Job;
 
+use super::mhd;
 use crate::{LoadError, load::Sources, problem::Problem};
 
 /// Most slices of one core.
@@ -43,6 +44,13 @@ pub(crate) fn find(
             }
             let image = folder.join(file);
             sources.hash_file(&image, job)?;
+            if mhd::is_header(&image) {
+                let bad =
+                    |why: String| LoadError::bad(image.display().to_string(), "NOT_A_SLICE", why);
+                let data = mhd::VoxelHeader::read(&image).map_err(bad)?.data;
+                let name = data.to_string_lossy().into_owned();
+                sources.hash_file(&sources.path_from(Path::new(""), &name)?, job)?;
+            }
             let prefix = format!(
                 "{}_mask-",
                 Path::new(file).file_stem().unwrap_or_default().to_string_lossy()
@@ -75,18 +83,19 @@ fn none(path: &Path, other: Option<&String>) -> LoadError {
             LoadError::bad(place, "NOT_A_SLICE", lost)
         }
         Some(_) => {
-            let message = "is neither TIFF, PNG, MetaImage (.mha) nor DICOM (.dcm): convert it";
+            let message =
+                "is neither TIFF, PNG, MetaImage (.mha, .mhd) nor DICOM (.dcm): convert it";
             LoadError::bad(place, "NOT_A_SLICE", message)
         }
         None => {
-            let message = "no image (.tif, .png, .mha, .dcm) has this name: check the path";
+            let message = "no image (.tif, .png, .mha, .mhd, .dcm) has this name: check the path";
             LoadError::NoInput(Problem::error(place, "NO_INPUT", message))
         }
     }
 }
 
 pub(crate) fn is_image(file: &str) -> bool {
-    matches!(extension(file).as_deref(), Some("tif" | "tiff" | "png" | "mha" | "dcm"))
+    matches!(extension(file).as_deref(), Some("tif" | "tiff" | "png" | "mha" | "mhd" | "dcm"))
 }
 
 pub(crate) fn extension(file: &str) -> Option<String> {

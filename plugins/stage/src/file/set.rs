@@ -3,7 +3,7 @@
 use std::{
     fs::{self, File, TryLockError},
     io::{self, Write},
-    path::{Path, PathBuf},
+    path::{Component, Path, PathBuf},
 };
 
 use serde::{Serialize, de::DeserializeOwned};
@@ -166,8 +166,14 @@ impl Set {
     /// The value of a part that is finished, and its files.
     pub fn recall<T: DeserializeOwned>(&mut self, name: &str) -> Option<T> {
         let text = fs::read_to_string(self.record(name)).ok()?;
-        let part = ron::from_str::<Part<T>>(&text).ok()?;
-        if part.name != name || !part.files.iter().all(|file| self.aside.join(file).is_file()) {
+        // What is damaged is done again: its value need not be one that the work could have made.
+        let (sum, text) = text.split_once('\n')?;
+        if sum != format!("{:016x}", hash(text)) {
+            return None;
+        }
+        let part = ron::from_str::<Part<T>>(text).ok()?;
+        let is_own = |file: &String| is_plain(file) && self.aside.join(file).is_file();
+        if part.name != name || !part.files.iter().all(is_own) {
             return None;
         }
         part.files.into_iter().for_each(|file| _ = self.place(file));
@@ -179,7 +185,8 @@ impl Set {
     pub fn keep(&self, name: &str, files: Vec<String>, value: &impl Serialize) {
         let part = Part { name: name.to_owned(), files, value };
         let text = ron::to_string(&part).map_err(io::Error::other);
-        let _ = text.and_then(|text| put(&self.record(name), |out| out.write_all(text.as_bytes())));
+        let sealed = text.map(|text| format!("{:016x}\n{text}", hash(&text)));
+        let _ = sealed.and_then(|all| put(&self.record(name), |out| out.write_all(all.as_bytes())));
     }
 
     fn record(&self, name: &str) -> PathBuf {
@@ -233,6 +240,12 @@ impl Drop for Set {
             self.made.iter().rev().for_each(|folder| _ = fs::remove_dir(folder));
         }
     }
+}
+
+/// Whether a name is that of a file in the folder itself, and leads nowhere else.
+fn is_plain(name: &str) -> bool {
+    let mut parts = Path::new(name).components();
+    matches!((parts.next(), parts.next()), (Some(Component::Normal(_)), None))
 }
 
 /// Makes a folder and those above it; names those that were not there.

@@ -7,6 +7,7 @@
 
 mod centre;
 mod detector;
+mod doubt;
 mod hardening;
 mod noise;
 mod rings;
@@ -14,6 +15,7 @@ mod scatter;
 
 pub use centre::axis_by_mirror;
 pub use detector::{Panel, bad_pixels, mend};
+pub use doubt::{mend_dead_bins, no_integrals, sinogram_doubts};
 pub use hardening::{Linearisation, Polynomial};
 pub use noise::counts;
 pub(crate) use noise::poisson;

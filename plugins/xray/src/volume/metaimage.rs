@@ -51,7 +51,7 @@ impl Element {
         })
     }
 
-    fn bytes(self) -> usize {
+    pub(super) fn bytes(self) -> usize {
         match self {
             Self::U8 | Self::I8 => 1,
             Self::U16 | Self::I16 => 2,
@@ -334,6 +334,11 @@ fn numbers<T: std::str::FromStr>(value: &str, most: usize) -> Result<Vec<T>, Str
 }
 
 impl Raw {
+    /// Slices that follow each other in one file, from the byte `skip` on.
+    pub(super) fn in_one(path: &Path, skip: u64, element: Element, msb: bool) -> Self {
+        Self { files: vec![path.to_owned()], skip: vec![skip], element, msb }
+    }
+
     /// Values of slice `z`.
     pub(super) fn slice(&self, z: usize, size: [usize; 3]) -> Result<Vec<f32>, VolumeError> {
         let (file, within) = if self.files.len() > 1 { (z, 0) } else { (0, z) };

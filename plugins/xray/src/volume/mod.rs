@@ -7,6 +7,7 @@
 
 mod dicom;
 mod metaimage;
+mod padding;
 mod picture;
 mod read;
 mod write;
@@ -17,6 +18,7 @@ use std::{
 };
 
 use intrados_stage::Job;
+pub use padding::without_padding;
 pub use read::Reader;
 pub use write::{Depth, Writer};
 

@@ -7,13 +7,16 @@ use std::{
     path::Path,
 };
 
-use intrados_stage::access::{self, Denied};
+use intrados_stage::{
+    access::{self, Denied},
+    decode::guarded,
+};
 use tiff::{
     decoder::{Decoder, DecodingResult, Limits},
     tags::Tag,
 };
 
-use super::{MAX_SIDE, VolumeError, by};
+use super::{MAX_SIDE, VolumeError, by, metaimage::Element};
 
 /// A picture file holds at most this many times its own length, or its header lies: deflate and LZW
 /// cannot pack denser.
@@ -52,8 +55,20 @@ pub(super) fn not_empty(
     }
 }
 
+/// What a decoder of a file does, behind the guard of all of them.
+pub(super) fn guard<T>(
+    path: &Path,
+    work: impl FnOnce() -> Result<T, VolumeError>,
+) -> Result<T, VolumeError> {
+    guarded(work, |why| VolumeError::bad(path, why.to_string()))
+}
+
 /// Which kind of picture a file is, and the size of its (first) page.
 pub(super) fn open(path: &Path) -> Result<(Picture, [usize; 2]), VolumeError> {
+    guard(path, || opened(path))
+}
+
+fn opened(path: &Path) -> Result<(Picture, [usize; 2]), VolumeError> {
     let (mut file, length) = open_plain(path)?;
     let mut magic = Vec::with_capacity(8);
     file.by_ref().take(8).read_to_end(&mut magic).map_err(VolumeError::missing(path))?;
@@ -68,7 +83,8 @@ pub(super) fn open(path: &Path) -> Result<(Picture, [usize; 2]), VolumeError> {
             let reader =
                 image::ImageReader::with_format(BufReader::new(file), image::ImageFormat::Png);
             let (w, h) = reader.into_dimensions().map_err(png_error(path))?;
-            Ok((Picture::Png, checked_size(path, w, h, length, 1)?))
+            // A pixel may be a bit of a byte: a mask without anything packs so densely.
+            Ok((Picture::Png, checked_size(path, w, h, 8 * length, 1)?))
         }
         _ => Err(VolumeError::bad(
             path,
@@ -146,6 +162,16 @@ pub(super) fn read_page(
     size: [usize; 2],
     length: u64,
 ) -> Result<(Pages, Vec<f32>), VolumeError> {
+    guard(path, || page_values(path, pages, page, size, length))
+}
+
+fn page_values(
+    path: &Path,
+    pages: Pages,
+    page: usize,
+    size: [usize; 2],
+    length: u64,
+) -> Result<(Pages, Vec<f32>), VolumeError> {
     let bad = tiff_error(path, page);
     let bytes = size[0] * size[1] * 8;
     let mut limits = Limits::default();
@@ -179,6 +205,10 @@ pub(super) fn read_page(
 
 /// Grey values of a PNG, which must be of `size`.
 pub(super) fn read_png(path: &Path, size: [usize; 2]) -> Result<Vec<f32>, VolumeError> {
+    guard(path, || png_values(path, size))
+}
+
+fn png_values(path: &Path, size: [usize; 2]) -> Result<Vec<f32>, VolumeError> {
     let (file, _) = open_plain(path)?;
     let mut reader = image::ImageReader::with_format(BufReader::new(file), image::ImageFormat::Png);
     let mut limits = image::Limits::default();
@@ -268,9 +298,23 @@ pub(super) fn voxel(pages: &mut Pages) -> Option<[f64; 3]> {
     Some([x, y, z])
 }
 
-/// Edges of a pixel by the tags of resolution, m. What image editors write of pictures that nobody
-/// measured, 72 and 96 dots an inch, tells nothing.
-pub(super) fn resolution(pages: &mut Pages) -> Option<[f64; 2]> {
+/// What the tags of resolution say of a pixel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Resolution {
+    /// Its edges, m.
+    Edges([f64; 2]),
+    /// Dots an inch that screens, printers and scanners have by default: no specimen's.
+    Default(f64),
+}
+
+/// Dots an inch that programs and devices write of pictures that nobody measured.
+const USUAL_DPI: [f64; 22] = [
+    70.0, 72.0, 75.0, 90.0, 96.0, 100.0, 120.0, 144.0, 150.0, 180.0, 192.0, 200.0, 220.0, 240.0,
+    250.0, 300.0, 350.0, 360.0, 400.0, 600.0, 1200.0, 2400.0,
+];
+
+/// What the tags of resolution say.
+pub(super) fn resolution(pages: &mut Pages) -> Option<Resolution> {
     let unit = match pages.get_tag_u32(Tag::ResolutionUnit).ok()? {
         2 => 0.0254,
         3 => 0.01,
@@ -281,9 +325,74 @@ pub(super) fn resolution(pages: &mut Pages) -> Option<[f64; 2]> {
         _ => None,
     };
     let edges = [edge(Tag::XResolution)?, edge(Tag::YResolution)?];
+    if !edges.iter().all(|e| e.is_finite() && *e > 0.0) {
+        return None;
+    }
     let usual =
-        |edge: f64| [72.0, 96.0].iter().any(|dots| (edge * dots / 0.0254 - 1.0).abs() < 1e-3);
-    edges.iter().all(|&e| e.is_finite() && e > 0.0 && !usual(e)).then_some(edges)
+        |edge: f64| USUAL_DPI.into_iter().find(|dots| (edge * dots / 0.0254 - 1.0).abs() < 2e-3);
+    match edges.map(usual) {
+        [Some(dots), Some(_)] => Some(Resolution::Default(dots)),
+        _ => Some(Resolution::Edges(edges)),
+    }
+}
+
+/// Slices that a TIFF of one page says it holds, and where they lie: ImageJ and tifffile write one
+/// page before all slices of a large stack, one after the other and not packed.
+pub(super) struct Following {
+    /// How many its description says.
+    pub(super) count: usize,
+    /// Where the first begins, how each value is stored, and whether its high byte comes first;
+    /// `None` where the file does not hold them.
+    pub(super) raw: Option<(u64, Element, bool)>,
+}
+
+/// How many slices the description of a TIFF says that it holds.
+pub(super) fn described(pages: &mut Pages) -> Option<usize> {
+    let description = pages.get_tag_ascii_string(Tag::ImageDescription).ok()?;
+    let text = description.trim();
+    if text.starts_with("ImageJ=") {
+        let line = text.lines().find_map(|line| line.trim().strip_prefix("images="))?;
+        return line.trim().parse().ok().filter(|n| *n > 1);
+    }
+    // {"shape": [20, 320, 320], "truncated": true}
+    let (_, shape) = text.strip_prefix('{')?.split_once("\"shape\"")?;
+    let list = shape.split_once('[')?.1.split_once(']')?.0;
+    let sides: Vec<usize> =
+        list.split(',').map(|n| n.trim().parse().ok()).collect::<Option<_>>()?;
+    let count = sides.iter().rev().skip(2).try_fold(1_usize, |all, n| all.checked_mul(*n))?;
+    (sides.len() > 2 && count > 1).then_some(count)
+}
+
+/// What lies behind the one page of a TIFF whose description says more of them.
+pub(super) fn following(
+    pages: &mut Pages,
+    size: [usize; 2],
+    length: u64,
+    is_big: bool,
+) -> Option<Following> {
+    let count = described(pages)?;
+    let mut number = |tag| pages.get_tag_u32(tag).ok();
+    let signed = number(Tag::SampleFormat).unwrap_or(1);
+    let element = match (number(Tag::BitsPerSample)?, signed) {
+        (8, 1) => Some(Element::U8),
+        (8, 2) => Some(Element::I8),
+        (16, 1) => Some(Element::U16),
+        (16, 2) => Some(Element::I16),
+        (32, 1) => Some(Element::U32),
+        (32, 2) => Some(Element::I32),
+        (32, 3) => Some(Element::F32),
+        (64, 3) => Some(Element::F64),
+        _ => None,
+    };
+    let is_plain = number(Tag::Compression).unwrap_or(1) == 1;
+    let offsets = pages.get_tag_u64_vec(Tag::StripOffsets).ok()?;
+    let from = *offsets.first()?;
+    let raw = element.filter(|element| {
+        let sides = [size[0], size[1], element.bytes(), count];
+        let need = sides.iter().try_fold(1_u64, |all, n| all.checked_mul(*n as u64));
+        is_plain && need.and_then(|need| need.checked_add(from)).is_some_and(|end| end <= length)
+    });
+    Some(Following { count, raw: raw.map(|element| (from, element, is_big)) })
 }
 
 pub(super) fn tiff_error(path: &Path, page: usize) -> impl Fn(tiff::TiffError) -> VolumeError {

@@ -3,6 +3,7 @@
 use std::{
     cmp::Ordering,
     ffi::OsStr,
+    io::Read,
     ops::Range,
     path::{Path, PathBuf},
 };
@@ -13,7 +14,7 @@ use super::{
     Grid, MAX_SIDE, Volume, VolumeError,
     dicom::{self, Series},
     metaimage::{self, Raw},
-    picture::{self, Pages, Picture},
+    picture::{self, Pages, Picture, Resolution},
 };
 
 /// A volume in files: its headers have been checked, its voxels are read when asked for.
@@ -23,6 +24,8 @@ pub struct Reader {
     path: PathBuf,
     /// Edges of a pixel by the file itself, m.
     told: Option<[f64; 2]>,
+    /// What the user should know of how it is read, one line each.
+    doubts: Vec<String>,
 }
 
 enum Source {
@@ -79,7 +82,8 @@ impl Reader {
                 let told = Grid::centred(grid.size, known_voxel(path, voxel, None)?);
                 grid = Grid { voxel: told.voxel, ..grid };
             }
-            return Ok(Self { source: Source::Raw(raw), grid, path: path.to_owned(), told: pixel });
+            let (source, path) = (Source::Raw(raw), path.to_owned());
+            return Ok(Self { source, grid, path, told: pixel, doubts: Vec::new() });
         }
         match picture::open(path)? {
             (Picture::Png, _) => Self::files(vec![path.to_owned()], voxel),
@@ -122,6 +126,7 @@ impl Reader {
         }
         let (mut told, mut pixel) = (None, None);
         let mut size = None;
+        let mut doubts = Vec::new();
         for file in &files {
             let (mut picture, found) = picture::open(file)?;
             picture::same_size(file, 0, found, *size.get_or_insert(found))?;
@@ -132,10 +137,14 @@ impl Reader {
                         "holds several pages beside other files; save each slice as a file of its own",
                     ));
                 }
-                told = told.or_else(|| picture::voxel(pages));
-                pixel = pixel.or_else(|| picture::resolution(pages));
+                let (voxel, edges) = picture::guard(file, || {
+                    Ok((picture::voxel(pages), picture::resolution(pages)))
+                })?;
+                told = told.or(voxel);
+                pixel = pixel.or(edges);
             }
         }
+        let pixel = believed(&first, pixel.filter(|_| told.is_none()), &mut doubts);
         let [w, h] = size.unwrap_or_default();
         let grid = Grid::centred([w, h, files.len()], known_voxel(&first, voxel, told)?);
         Ok(Self {
@@ -143,17 +152,18 @@ impl Reader {
             grid,
             path: first,
             told: told.map(|[x, y, _]| [x, y]).or(pixel),
+            doubts,
         })
     }
 
     fn dicom(files: &[PathBuf], voxel: Option<[f64; 3]>) -> Result<Self, VolumeError> {
-        let (series, grid, [pixel, all]) = dicom::open(files)?;
+        let dicom::Opened { series, grid, known: [pixel, all], doubts } = dicom::open(files)?;
         let path = files[0].clone();
         let told = pixel.then_some([grid.voxel[0], grid.voxel[1]]);
         // A single slice needs no distance to the next one.
         let known = (pixel && (all || grid.size[2] == 1)).then_some(grid.voxel);
         let grid = Grid::centred(grid.size, known_voxel(&path, voxel, known)?);
-        Ok(Self { source: Source::Dicom(series), grid, path, told })
+        Ok(Self { source: Source::Dicom(series), grid, path, told, doubts })
     }
 
     fn pages(
@@ -163,32 +173,37 @@ impl Reader {
         voxel: Option<[f64; 3]>,
     ) -> Result<Self, VolumeError> {
         let length = std::fs::metadata(path).map_err(VolumeError::missing(path))?.len();
-        let told = picture::voxel(&mut pages);
-        let pixel = told.map(|[x, y, _]| [x, y]).or_else(|| picture::resolution(&mut pages));
-        let mut count = 1;
-        while pages.more_images() {
-            if count == MAX_SIDE {
-                return Err(VolumeError::bad(
-                    path,
-                    format!("has more than {MAX_SIDE} pages, or its chain of pages is damaged"),
-                ));
+        let mut doubts = Vec::new();
+        let (told, pixel, count, described) = picture::guard(path, || {
+            let told = picture::voxel(&mut pages);
+            let pixel = picture::resolution(&mut pages).filter(|_| told.is_none());
+            let described = picture::following(&mut pages, size, length, is_big(path)?);
+            Ok((told, pixel, count_pages(path, &mut pages, size, length)?, described))
+        })?;
+        let pixel = told.map(|[x, y, _]| [x, y]).or(believed(path, pixel, &mut doubts));
+        let (mut source, mut count) = (Source::Pages(Some(pages), length), count);
+        if let Some(all) = described.filter(|all| all.count != count) {
+            match all.raw.filter(|_| count == 1 && all.count <= MAX_SIDE) {
+                Some((from, element, msb)) => {
+                    source = Source::Raw(Raw::in_one(path, from, element, msb));
+                    count = all.count;
+                }
+                None => doubts.push(format!(
+                    "{}: its description says {} slices and it holds {count}: was it cut short, or is it one of them?",
+                    path.display(),
+                    all.count
+                )),
             }
-            pages.next_image().map_err(picture::tiff_error(path, count))?;
-            picture::same_size(
-                path,
-                count,
-                picture::page_size(path, &mut pages, count, length)?,
-                size,
-            )?;
-            count += 1;
         }
         let grid = Grid::centred([size[0], size[1], count], known_voxel(path, voxel, told)?);
-        Ok(Self {
-            source: Source::Pages(Some(pages), length),
-            grid,
-            path: path.to_owned(),
-            told: pixel,
-        })
+        Ok(Self { source, grid, path: path.to_owned(), told: pixel, doubts })
+    }
+
+    /// What the user should know of how it is read, one line each: what its files do not say and is
+    /// assumed, and what they say that cannot be.
+    #[must_use]
+    pub fn doubts(&self) -> &[String] {
+        &self.doubts
     }
 
     /// Size, voxel and place.
@@ -279,6 +294,58 @@ impl Reader {
             }
         }
     }
+}
+
+/// Edges of a pixel by the tags of resolution, m, where they are no device's default.
+fn believed(
+    path: &Path,
+    resolution: Option<Resolution>,
+    doubts: &mut Vec<String>,
+) -> Option<[f64; 2]> {
+    match resolution? {
+        Resolution::Edges(edges) => Some(edges),
+        Resolution::Default(dots) => {
+            // Of screens every program writes them.
+            if dots > 96.0 {
+                doubts.push(format!(
+                    "{}: its tags say {dots} dots an inch, {:.4} mm a pixel: a default of scanners and editors, which is not believed; give the edge of a pixel",
+                    path.display(),
+                    25.4 / dots
+                ));
+            }
+            None
+        }
+    }
+}
+
+/// Whether a TIFF has the high byte first.
+fn is_big(path: &Path) -> Result<bool, VolumeError> {
+    let (mut file, _) = picture::open_plain(path)?;
+    let mut head = [0; 2];
+    file.read_exact(&mut head).map_err(VolumeError::missing(path))?;
+    Ok(head == *b"MM")
+}
+
+/// Counts the pages of a TIFF, which must be of one size.
+fn count_pages(
+    path: &Path,
+    pages: &mut Pages,
+    size: [usize; 2],
+    length: u64,
+) -> Result<usize, VolumeError> {
+    let mut count = 1;
+    while pages.more_images() {
+        if count == MAX_SIDE {
+            return Err(VolumeError::bad(
+                path,
+                format!("has more than {MAX_SIDE} pages, or its chain of pages is damaged"),
+            ));
+        }
+        pages.next_image().map_err(picture::tiff_error(path, count))?;
+        picture::same_size(path, count, picture::page_size(path, pages, count, length)?, size)?;
+        count += 1;
+    }
+    Ok(count)
 }
 
 fn known_voxel(

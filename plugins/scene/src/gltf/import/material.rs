@@ -3,7 +3,10 @@
 use std::{collections::HashMap, io::Cursor};
 
 use glam::{Affine2, Vec2, Vec3};
-use intrados_stage::{Cancelled, Job};
+use intrados_stage::{
+    Cancelled, Job,
+    decode::{self, DecodeLimits, PictureSize},
+};
 use serde_json::Value;
 
 use super::Notes;
@@ -190,20 +193,36 @@ pub(in crate::gltf) fn decode(
     let reader = || {
         image::ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| e.to_string())
     };
-    let (width, height) = reader()?.into_dimensions().map_err(line)?;
-    let left = document.texels.get().checked_sub((width as usize).saturating_mul(height as usize));
-    let beyond = || {
-        format!(
-            "{width} x {height} texels are {BEYOND} of {} million for all textures; make it smaller",
-            MAX_TEXELS >> 20
-        )
+    let header = || {
+        let (width, height) = reader()?.into_dimensions().map_err(line)?;
+        let all = (width as usize).saturating_mul(height as usize);
+        let beyond = || {
+            format!(
+                "{width} x {height} texels are {BEYOND} of {} million for all textures; make it smaller",
+                MAX_TEXELS >> 20
+            )
+        };
+        document.texels.set(document.texels.get().checked_sub(all).ok_or_else(beyond)?);
+        let [width, height] = [width, height].map(u64::from);
+        // A texel may be a bit of a byte.
+        let file_bytes = 8 * bytes.len() as u64;
+        Ok((PictureSize { width, height, pixel_bytes: 1, file_bytes }, ()))
     };
-    document.texels.set(left.ok_or_else(beyond)?);
-    let mut reader = reader()?;
-    let mut limits = image::Limits::default();
-    limits.max_alloc = Some(512 << 20);
-    reader.limits(limits);
-    reader.decode().map_err(line)
+    let pixels = |()| {
+        let mut reader = reader()?;
+        let mut limits = image::Limits::default();
+        limits.max_alloc = Some(512 << 20);
+        reader.limits(limits);
+        let image = reader.decode().map_err(line)?;
+        match decode::jpeg::markers(bytes) {
+            Some(markers) if !markers.is_whole => {
+                Err("is cut short: the end of the JPEG is missing".to_owned())
+            }
+            _ => Ok(image),
+        }
+    };
+    let limits = DecodeLimits { side: u64::from(u32::MAX), pixels: MAX_TEXELS as u64 };
+    decode::decode(&limits, header, pixels, |why| why.to_string())
 }
 
 /// sRGB to linear (IEC 61966-2-1).
