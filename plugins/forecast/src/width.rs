@@ -1,4 +1,8 @@
 //! Crack width from the stress of steel (EN 1992-1-1, 7.3.4), which does not depend on the mesh.
+//!
+//! Expression 7.9 asks for the stress *at a crack* and deducts from its strain what the concrete
+//! carries between cracks. Elements with smeared cracks give the mean stress between cracks, from
+//! which that is missing already: [`Tie::at_crack`] adds it first.
 
 /// Steel's modulus, Pa (EN 1992-1-1, 3.2.7).
 pub(crate) const E_STEEL: f64 = 200e9;
@@ -8,7 +12,7 @@ const LASTING: f64 = 0.4;
 /// A bar and the concrete that it pulls on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tie {
-    /// Stress of the bar, Pa.
+    /// Stress of the bar at a crack, Pa.
     pub stress: f64,
     /// Its diameter, m.
     pub diameter: f64,
@@ -22,15 +26,32 @@ pub struct Tie {
     pub modular_ratio: f64,
 }
 
+impl Tie {
+    /// ρ_p,eff: its section over that of the concrete within 2.5 (c + φ/2) of the face and half way
+    /// to the next bars; bars farther apart than 5 (c + φ/2) have none farther.
+    fn ratio(&self) -> f64 {
+        let depth = 2.5 * (self.cover + 0.5 * self.diameter);
+        let area = 0.25 * std::f64::consts::PI * self.diameter.powi(2);
+        area / (depth * self.spacing.clamp(self.diameter, 2.0 * depth))
+    }
+
+    /// The same bar at a crack, if its stress so far is the mean between cracks, where the concrete
+    /// that it pulls on has a mean tension (Pa): across a crack the bar takes over that force.
+    #[must_use]
+    pub(crate) fn at_crack(self, concrete: f64) -> Self {
+        if self.stress <= 0.0 {
+            return self;
+        }
+        let force = concrete.clamp(0.0, self.tensile_strength) / self.ratio();
+        Self { stress: self.stress + force, ..self }
+    }
+}
+
 /// w_k = s_r,max (ε_sm − ε_cm), m: expressions 7.8, 7.9 and 7.11 for ribbed bars in bending (k₁ =
-/// .8, k₂ = .5). Concrete within 2.5 (c + φ/2) of the face and half way to the next bar belongs to
-/// the bar; bars farther apart than 5 (c + φ/2) have cracks between them as if there were none
-/// farther.
+/// .8, k₂ = .5).
 #[must_use]
 pub(crate) fn crack_width(tie: &Tie) -> f64 {
-    let depth = 2.5 * (tie.cover + 0.5 * tie.diameter);
-    let area = 0.25 * std::f64::consts::PI * tie.diameter.powi(2);
-    let ratio = area / (depth * tie.spacing.clamp(tie.diameter, 2.0 * depth));
+    let ratio = tie.ratio();
     let spacing = 3.4 * tie.cover + 0.425 * 0.8 * 0.5 * tie.diameter / ratio;
     let bare = tie.stress / E_STEEL;
     let stiffened =
