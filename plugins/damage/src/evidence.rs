@@ -84,7 +84,10 @@ impl LifeEnd {
     pub fn sentence(&self) -> String {
         let when = match (self.age_years, self.ahead_years) {
             (_, ahead) if ahead > 0.0 => {
-                format!("fails in year {:.0} of its life, {ahead:.0} years from now", self.age_years)
+                format!(
+                    "fails in year {:.0} of its life, {ahead:.0} years from now",
+                    self.age_years
+                )
             }
             (age, _) if age < 2.0 => format!("fails on day {:.0} of its life", 365.25 * age),
             (age, _) => format!("fails in year {age:.0} of its life"),

@@ -191,7 +191,8 @@ impl Verdict {
         let is_settled = basis == Basis::Measured && best == worst;
         let state = profile.state(damage.value, widest);
         let is_probably_sound = state == profile.states.first();
-        let is_admitted = looked.admitted.is_some() && profile.states.iter().take(2).any(|s| Some(s) == state);
+        let is_admitted =
+            looked.admitted.is_some() && profile.states.iter().take(2).any(|s| Some(s) == state);
         let to_inspect = (is_probably_sound || is_admitted) && !looked.found && !is_settled;
         if let Some(admitted) = looked.admitted.filter(|_| to_inspect) {
             return Self::watched(profile, &likely, basis, looked.unseen, admitted);
@@ -248,11 +249,8 @@ impl Verdict {
             false => String::new(),
         };
         let months = profile.states.get(1).and_then(|s| s.within_months);
-        let months = if percent > 0.0 {
-            sooner(months, profile.inspect_within_months)
-        } else {
-            months
-        };
+        let months =
+            if percent > 0.0 { sooner(months, profile.inspect_within_months) } else { months };
         Self {
             state: match said[..] {
                 [sound, fair] => format!("between {sound} and {fair}"),
@@ -357,12 +355,7 @@ fn inspection(basis: Basis, looked: Looked) -> String {
 
 /// That of the state where it is settled; else to look, and until then to do what the worst of what
 /// may be asks for.
-fn advice(
-    profile: &Profile,
-    [best, worst]: [usize; 2],
-    urgent: usize,
-    basis: Basis,
-) -> String {
+fn advice(profile: &Profile, [best, worst]: [usize; 2], urgent: usize, basis: Basis) -> String {
     let state = &profile.states[urgent];
     if best == worst && basis == Basis::Measured {
         return state.advice.clone();
@@ -590,7 +583,8 @@ mod tests {
             assert_eq!(verdict.within_months, Some(12), "{verdict:?}");
         }
         // Of a forecast alone cracks ask for eyes within the time of an inspection.
-        let cracks = of(reading(0.0, 0.34), &[reading(0.4, 0.16)], Basis::Forecast, Looked::NOWHERE);
+        let cracks =
+            of(reading(0.0, 0.34), &[reading(0.4, 0.16)], Basis::Forecast, Looked::NOWHERE);
         assert!(!cracks.to_inspect && cracks.within_months == Some(24), "{cracks:?}");
     }
 
@@ -602,13 +596,15 @@ mod tests {
         let mut last = u32::MAX;
         for step in 0..=20 {
             let damage = reading(0.05 * f64::from(step), 0.3);
-            for (basis, looked) in
-                [(Basis::Measured, looked), (Basis::Forecast, Looked::NOWHERE)]
-            {
+            for (basis, looked) in [(Basis::Measured, looked), (Basis::Forecast, Looked::NOWHERE)] {
                 let verdict = Verdict::of(&profile, Some(damage), &[], basis, looked);
                 let is_at_once = verdict.within_months == Some(0);
                 assert!(!is_at_once || verdict.probability["severe"] >= CALLED, "{verdict:?}");
-                assert_eq!(is_at_once, verdict.advice.contains("severe") || verdict.advice.contains("without delay"), "{verdict:?}");
+                assert_eq!(
+                    is_at_once,
+                    verdict.advice.contains("severe") || verdict.advice.contains("without delay"),
+                    "{verdict:?}"
+                );
             }
             // More damage is never less urgent.
             let verdict = Verdict::of(&profile, Some(damage), &[], Basis::Measured, looked);
@@ -625,21 +621,19 @@ mod tests {
         let profile = Profile::default();
         let limit = 0.3;
         let mut last = u32::MAX;
-        for width in [0.02, 0.05, 0.1, 0.2, 0.28, 0.3, 0.31, 0.35, 0.5, 1.0, 2.0] {
+        for width in [0.02_f64, 0.05, 0.1, 0.2, 0.28, 0.3, 0.31, 0.35, 0.5, 1.0, 2.0] {
             for unseen in [0, 5, 9] {
                 let damage = reading(0.5 * width.min(1.0), 0.1);
                 let own = |zone| (zone >= unseen).then_some(damage);
                 let zones = Zones(std::array::from_fn(own));
                 let evidence =
                     Evidence::new("survey", true, [(Cause::Concrete, zones)].into(), "".into());
-                let evidence =
-                    Evidence { crack_width_mm: Some(width), ..evidence.unwrap() };
+                let evidence = Evidence { crack_width_mm: Some(width), ..evidence.unwrap() };
                 let listed = width > limit;
                 let looked = Looked::of(&profile, &[&evidence], listed, Some(limit));
                 let whole = reading(damage.value, 0.3);
                 let cracks = profile.cracks(&[&evidence]);
-                let verdict =
-                    Verdict::of(&profile, Some(whole), &cracks, Basis::Measured, looked);
+                let verdict = Verdict::of(&profile, Some(whole), &cracks, Basis::Measured, looked);
                 let is_watched = verdict.advice.starts_with("Monitor");
                 assert_eq!(is_watched, width <= limit, "{width} {unseen} {verdict:?}");
                 if is_watched {
@@ -696,10 +690,7 @@ mod tests {
             e.unwrap()
         };
         let of = |e: &Evidence| Looked::of(&profile, &[e], false, None);
-        assert_eq!(
-            of(&said(0.0, true)),
-            Looked { found: false, unseen: 0.7, admitted: None }
-        );
+        assert_eq!(of(&said(0.0, true)), Looked { found: false, unseen: 0.7, admitted: None });
         assert_eq!(of(&said(0.3, true)), Looked { found: true, unseen: 0.7, admitted: None });
         assert_eq!(of(&said(0.3, false)), Looked::NOWHERE);
         let cracked = Evidence { crack_width_mm: Some(0.1), ..said(0.0, true) };

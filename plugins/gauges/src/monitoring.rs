@@ -186,12 +186,10 @@ fn drift(
         };
         by(true) - by(false)
     };
-    let crept = rows.iter().map(|r| r.creep).fold([0.0_f64; 2], |[low, high], c| {
-        [low.min(c), high.max(c)]
-    });
+    let crept =
+        rows.iter().map(|r| r.creep).fold([0.0_f64; 2], |[low, high], c| [low.min(c), high.max(c)]);
     let of_creep = CREEP * (crept[1] - crept[0]);
-    let left =
-        Estimate { value: fit.drift.value, std_error: fit.drift.std_error.hypot(of_creep) };
+    let left = Estimate { value: fit.drift.value, std_error: fit.drift.std_error.hypot(of_creep) };
     Ok(Drift {
         gauge: series.gauge.clone(),
         samples: samples.len(),
@@ -438,7 +436,13 @@ mod tests {
 
     /// Weekly readings of a column of an age of ten years, by a gauge that errs by `noise`, with or
     /// without summers that it does not compensate.
-    fn planted(drift: impl Fn(f64) -> f64, noise: f64, weeks: i32, summers: bool, seed: u64) -> Series {
+    fn planted(
+        drift: impl Fn(f64) -> f64,
+        noise: f64,
+        weeks: i32,
+        summers: bool,
+        seed: u64,
+    ) -> Series {
         let course = course();
         let key = Key::new(seed, 0);
         let begin: Date = "2024-01-01".parse().unwrap();
@@ -477,7 +481,10 @@ mod tests {
                         let half_year = weeks < 52 && summers;
                         let fair = 6.0 * noise + 0.12 * total.abs() + 5e-6;
                         assert!(std_error < if half_year { 1e-4 } else { fair }, "{place}");
-                        assert!((value - total).abs() < if half_year { 2e-4 } else { fair }, "{place}");
+                        assert!(
+                            (value - total).abs() < if half_year { 2e-4 } else { fair },
+                            "{place}"
+                        );
                     };
                     close("flat".into(), 0.0, &|_| 0.0);
                     for total in [-2e-4, -5e-5, 2e-5, 5e-5, 2e-4, 1e-3] {

@@ -163,7 +163,8 @@ pub(crate) fn has_defects(
     let beyond = |lost: Option<Estimate>| lost.is_some_and(|lost| is_beyond(&lost));
     let shows = |s: &SliceReading| {
         s.cracks.iter().any(|c| !is_admitted(c.width_mm))
-            || beyond(s.lost) || beyond(s.steel.map(|steel| steel.loss))
+            || beyond(s.lost)
+            || beyond(s.steel.map(|steel| steel.loss))
     };
     survey::found_again(&all, length).iter().any(last) || slices.iter().any(shows)
 }

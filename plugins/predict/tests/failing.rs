@@ -60,7 +60,11 @@ fn overload_is_the_worst_finding_and_comes_first() {
             let reason = &prediction.failures[0].reason;
             assert!(reason.contains("fails on day 2"), "{reason}");
             assert!(first.advice.contains(reason.trim_end_matches('.')), "{}", first.advice);
-            assert!(prediction.limits[0].starts_with("B: By computation"), "{:?}", prediction.limits);
+            assert!(
+                prediction.limits[0].starts_with("B: By computation"),
+                "{:?}",
+                prediction.limits
+            );
             assert!(second.failure.is_none() && !second.state.contains("severe"));
             let severe = first.state_probability["severe"];
             assert!(severe >= last * 0.999);

@@ -22,9 +22,8 @@ pub fn found_again(observations: &[&Observation], length_m: f64) -> Vec<Vec<usiz
         let mut touched = Vec::with_capacity(one_date.len());
         for &k in one_date {
             let later = observations[k];
-            let apart = |group: usize| {
-                apart(observations[*groups.get(group)?.last()?], later, length_m)
-            };
+            let apart =
+                |group: usize| apart(observations[*groups.get(group)?.last()?], later, length_m);
             match earlier.take_nearest(later, length_m, apart) {
                 Some(group) => {
                     groups[group].push(k);

@@ -48,8 +48,7 @@ fn placed<'a>(all: &'a [Shows], spread: bool) -> Vec<Placed<'a>> {
 fn weighed(site: &Site, readings: &[Placed]) -> (f64, f64) {
     let profile = Profile::default();
     let mut unused = BTreeMap::new();
-    let said =
-        rust::Weighed::new(site, readings, &profile, &mut unused, &Job::default()).unwrap();
+    let said = rust::Weighed::new(site, readings, &profile, &mut unused, &Job::default()).unwrap();
     assert!(unused.is_empty(), "{unused:?}");
     let lost = said.zones().and_then(|(_, zones)| zones.worst()).unwrap().1.value;
     (said.worst().unwrap().1, lost)
@@ -83,11 +82,8 @@ fn worse_readings_never_say_less_rust() {
     };
     let front = |error: f64| move |mm| Shows::Carbonation { mm, std_error_mm: error };
     let cover = |error: f64| move |mm| Shows::Cover { mm, std_error_mm: error };
-    let potential = |mv: f64| Shows::HalfCell {
-        mv,
-        std_error_mv: 10.0,
-        electrode: Electrode::CopperSulphate,
-    };
+    let potential =
+        |mv: f64| Shows::HalfCell { mv, std_error_mv: 10.0, electrode: Electrode::CopperSulphate };
     let fronts = [0.0, 0.5, 2.0, 5.0, 10.0, 20.0, 30.0, 45.0, 60.0, 75.0, 90.0, 200.0];
     let salts = [0.0, 0.05, 0.2, 0.5, 1.0, 1.5, 2.0, 3.0, 5.0, 10.0, 50.0];
     let potentials =
@@ -199,12 +195,8 @@ fn wider_cracks_never_do_less_damage() {
                     .iter()
                     .map(|&width_mm| {
                         let std_error_mm = if error < 0.0 { -error * width_mm } else { error };
-                        let crack = |width_mm| Shows::Crack {
-                            width_mm,
-                            std_error_mm,
-                            course,
-                            length_m,
-                        };
+                        let crack =
+                            |width_mm| Shows::Crack { width_mm, std_error_mm, course, length_m };
                         let mut all = vec![crack(0.15); count - 1];
                         all.push(crack(width_mm));
                         damage(&site, &all)
@@ -227,7 +219,10 @@ fn larger_spalls_never_do_less_damage() {
     let areas = [0.001, 0.01, 0.05, 0.1, 0.3, 0.6, 1.0, 2.0, 5.0];
     let spall = |area_m2: f64, depth_mm| Shows::Spall { area_m2, depth_mm, bars_bare: true };
     let hollow = |area: f64| Shows::Sounding { hollow_m2: area, tapped_m2: 6.0 };
-    for of in [&|a| spall(a, None), &|a| spall(a, Some(60.0)), &hollow as &dyn Fn(f64) -> Shows] {
+    let unmeasured = |area: f64| spall(area, None);
+    let measured = |area: f64| spall(area, Some(60.0));
+    let all: [&dyn Fn(f64) -> Shows; 3] = [&unmeasured, &measured, &hollow];
+    for of in all {
         let found: Vec<f64> = areas.iter().map(|&area| damage(&site, &[of(area)])).collect();
         assert!(found.windows(2).all(|w| w[1] >= w[0] - ROUNDING), "{found:?}");
     }
@@ -317,6 +312,10 @@ fn many_readings_of_one_member_are_gathered() {
 #[test]
 fn nothing_lost_stays_nothing() {
     let intact = Shows::Intact { seen: 1.0, limit_mm: 0.15 };
-    let zones = Zones(findings::lost(&site("XC4", 0.03, true), &placed(&[intact], false), &Profile::default().rule));
+    let zones = Zones(findings::lost(
+        &site("XC4", 0.03, true),
+        &placed(&[intact], false),
+        &Profile::default().rule,
+    ));
     assert_eq!(zones.worst().map(|(_, e): (usize, Estimate)| e.value), Some(0.0));
 }

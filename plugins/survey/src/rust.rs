@@ -170,7 +170,8 @@ impl Weighed {
             cells.iter().filter_map(|cell| GatheredCell::of(site, cell)).collect();
         let reach = profile.fusion.correlation_m.get(&Cause::Steel).copied().unwrap_or(1.0);
         for zone in 0..ZONES {
-            let loudest = cells.iter().map(|cell| cell.loudest(site, zone, reach));
+            // Of many alike in one place each counts less, and all of them as one.
+            let loudest = cells.iter().map(|cell| site.heard(cell.zones, zone, reach));
             if loudest.fold(0.0, f64::max) < HEARD || site.bars[zone].is_empty() {
                 continue;
             }
@@ -351,23 +352,6 @@ struct GatheredCell {
     sights: Vec<Sight>,
 }
 
-impl ReadingCell<'_> {
-    /// The largest power that one of its readings is heard with in a zone.
-    fn loudest(&self, site: &Site, zone: usize, reach: f64) -> f64 {
-        let mut counts: BTreeMap<_, f64> = BTreeMap::new();
-        self.readings.iter().for_each(|p| *counts.entry(kind_of(p)).or_default() += 1.0);
-        let is_cover = |kind: &(&str, Option<u8>)| kind.0 == COVER_KIND;
-        let of = |(kind, count): (&(&str, Option<u8>), &f64)| match is_cover(kind) {
-            true => 1.0,
-            false => count.recip(),
-        };
-        site.heard(self.zones, zone, reach) * counts.iter().map(of).fold(0.0, f64::max)
-    }
-}
-
-/// What covers are called among kinds of readings.
-const COVER_KIND: &str = "cover";
-
 /// What errs together in one place: readings of one kind; what is intact at one face says nothing
 /// of another.
 fn kind_of(p: &Placed) -> (&'static str, Option<u8>) {
@@ -389,7 +373,9 @@ impl GatheredCell {
                     potentials.push([age, rusts(mv, std_error_mv)]);
                     continue;
                 }
-                Shows::Cover { .. } | Shows::Carbonation { .. } | Shows::Chloride { .. } => continue,
+                Shows::Cover { .. } | Shows::Carbonation { .. } | Shows::Chloride { .. } => {
+                    continue;
+                }
                 Shows::Intact { seen, limit_mm } => {
                     Shows::Intact { seen: seen * p.around(), limit_mm }
                 }
@@ -441,9 +427,7 @@ impl GatheredCell {
 /// Their shares sum to one.
 fn pooled(mut sights: Vec<Sight>) -> Vec<Sight> {
     let count = sights.len().max(1) as f64;
-    sights.sort_by(|a, b| {
-        size(&a.shows).total_cmp(&size(&b.shows)).then(a.age.total_cmp(&b.age))
-    });
+    sights.sort_by(|a, b| size(&a.shows).total_cmp(&size(&b.shows)).then(a.age.total_cmp(&b.age)));
     let mut some: Vec<Sight> = Vec::new();
     for sight in sights {
         match some.last_mut() {

@@ -87,8 +87,7 @@ pub fn surveyed(
     let concrete = strength::Concrete::of(scene, index);
     let stiffness = shrunk(&strength::stiffness(&concrete, &placed), Cause::Stiffness, profile);
     said.put(Cause::Stiffness, &stiffness, profile, &site);
-    let strengths =
-        shrunk(&strength::strength(&concrete, &placed), Cause::Concrete, profile);
+    let strengths = shrunk(&strength::strength(&concrete, &placed), Cause::Concrete, profile);
     // Of what was found again the latest counts.
     let seen: Vec<&Observation> = all.iter().map(|(_, o)| *o).collect();
     let is_old = is_superseded(&seen, site.length);
@@ -211,10 +210,8 @@ impl Said {
         let field = Field::of(profile, cause, site.length);
         // What was found counts in full: it must not leave its zone less known than before, but
         // being hard to tell makes it no smaller.
-        let capped = |reading: Estimate| Estimate {
-            std_error: reading.std_error.min(field.sd),
-            ..reading
-        };
+        let capped =
+            |reading: Estimate| Estimate { std_error: reading.std_error.min(field.sd), ..reading };
         let word = |(zone, reading): (usize, &Option<Estimate>)| {
             Some(Word { along: Some(middle(zone)), reading: capped((*reading)?), core: zone })
         };

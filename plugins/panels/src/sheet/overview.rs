@@ -67,9 +67,7 @@ fn worst(
         let end = latest.member(*i).and_then(|p| p.failure.as_ref());
         end.map_or(f64::INFINITY, |end| end.ahead_years)
     };
-    known.sort_by(|a, b| {
-        fails(a).total_cmp(&fails(b)).then(damage(b).total_cmp(&damage(a)))
-    });
+    known.sort_by(|a, b| fails(a).total_cmp(&fails(b)).then(damage(b).total_cmp(&damage(a))));
     if known.is_empty() {
         return;
     }

@@ -702,12 +702,7 @@ impl Predictor {
     /// Whether anything has been found to be wrong with a member so far, beside cracks within
     /// `limit_mm`.
     #[must_use]
-    pub(crate) fn has_found(
-        &self,
-        scene: &Scene,
-        member: usize,
-        limit_mm: Option<f64>,
-    ) -> bool {
+    pub(crate) fn has_found(&self, scene: &Scene, member: usize, limit_mm: Option<f64>) -> bool {
         let (Some(readings), Some(m)) = (self.readings.get(member), scene.members.get(member))
         else {
             return false;

@@ -220,8 +220,10 @@ impl Predictor {
             let why = self.overloaded.get(&assembly.id)?.clone();
             let age = evidence.get(FORECAST).and_then(|e| e.details.get("age_years")?.as_f64());
             let of = |is: bool, what: &str| is.then(|| what.to_owned());
-            let assumed =
-                [of(assembly.steel_assumed, "reinforcement"), of(assembly.concrete_assumed, "concrete")];
+            let assumed = [
+                of(assembly.steel_assumed, "reinforcement"),
+                of(assembly.concrete_assumed, "concrete"),
+            ];
             Some(LifeEnd {
                 age_years: age.unwrap_or(0.0),
                 ahead_years: 0.0,
