@@ -9,7 +9,7 @@
 //! | reading | moved | error |
 //! |---|---|---|
 //! | cover | the cover's deviation from the drawing, m | its own and 5 mm between bars |
-//! | carbonation | logarithm of the front's rate | its own, relative to the expected depth (10 mm at least), and 15 % of the model |
+//! | carbonation | logarithm of the front's rate | its own, relative to the expected or, if that is more, the read depth (10 mm at least), and 15 % of the model |
 //! | chloride | surface content (never below 1.25 × what is read) and diffusion, so that Fick's profile passes through the samples; those near the bars count most, by exp(−distance/15 mm) | its own, and 15 % of the model |
 //!
 //! What is stated has the deviation that the class's model gives it. What is assumed yields: 20 mm
@@ -201,8 +201,10 @@ impl MeasuredState {
                     if unit <= 0.0 || !unit.is_finite() {
                         continue;
                     }
-                    let expected = (prior.mean.exp() * unit).max(LEAST_FRONT);
-                    let error = (1e-3 * std_error_mm / expected).hypot(MODEL);
+                    // Not relative to a shallow reading: a small one would say the less, the less
+                    // it is.
+                    let depth = (prior.mean.exp() * unit).max(1e-3 * mm).max(LEAST_FRONT);
+                    let error = (1e-3 * std_error_mm / depth).hypot(MODEL);
                     let rate = (1e-3 * mm).max(LEAST_DEPTH) / unit;
                     found.front.add(rate.ln(), error, 1.0 / fronts);
                 }
