@@ -31,6 +31,7 @@ pub(crate) fn limits(
     members: &[MemberPrediction],
     items: &[ledger::Item],
     unraised: &[(&str, &str)],
+    to_check: &[String],
     by_strength: bool,
 ) -> Vec<String> {
     let damage = if by_strength {
@@ -104,6 +105,10 @@ pub(crate) fn limits(
         );
     }
     limits.splice(0..0, limits_of_states(members));
+    limits.splice(0..0, to_check.iter().map(|line| format!("Check an assumption: {line}.")));
+    let failing = members.iter().filter_map(|m| Some((m, m.failure.as_ref()?)));
+    let failing = failing.map(|(m, end)| format!("{}: {}", m.name, end.sentence()));
+    limits.splice(0..0, failing.collect::<Vec<_>>());
     let assumed_steel =
         |m: &&MemberPrediction| scene.structure.assembly_of(&m.id).is_some_and(|a| a.steel_assumed);
     let assumed = [
