@@ -165,7 +165,7 @@ pub(crate) enum Command {
     /// Runs an experiment that a README or the documentation quotes
     #[command(after_help = "Example:\n  intrados experiment table-3-1 --cases 1..20 --out table")]
     Experiment(Experiment),
-    /// Runs the battery of exact checks
+    /// Runs the battery of checks: closed forms, walks, sampling
     #[command(after_help = "Example:\n  intrados verify --format json")]
     Verify,
     /// Adds up accumulators of one scene that `--shard` wrote

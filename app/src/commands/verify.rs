@@ -1,4 +1,4 @@
-//! `intrados verify`: the battery of exact checks (theory §7).
+//! `intrados verify`: the battery of checks (theory §7), counted by what an agreement rests on.
 
 use intrados_stage::{Cancelled, Job};
 use intrados_transport::Check;
@@ -19,6 +19,70 @@ struct Report {
     checks: Vec<Check>,
     passed: usize,
     failed: usize,
+    /// How many checks rest on what.
+    bases: BasisCounts,
+}
+
+/// What the agreement of a check rests on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum CheckBasis {
+    /// A closed form, met within 1e-6.
+    Exact,
+    /// A closed form or a published value, within the stated error of a discretisation or of its
+    /// printed digits.
+    Discretised,
+    /// Random walks or samples, within their own standard error or a level of χ².
+    Statistical,
+    /// How the method went when it was first run: no theory says the number.
+    Regression,
+}
+
+/// How many checks rest on what.
+#[derive(Debug, Default, Serialize)]
+struct BasisCounts {
+    exact: usize,
+    discretised: usize,
+    statistical: usize,
+    regression: usize,
+}
+
+/// What counts as exact: relative to what is expected, or absolute where that is 0.
+const EXACT: f64 = 1e-6;
+
+fn basis_of(check: &Check) -> CheckBasis {
+    let sampled = ["duality", "energy", "length", "oracle", "reference", "sampling", "wrong field"];
+    let scale = if check.expected == 0.0 { 1.0 } else { check.expected.abs() };
+    if sampled.contains(&check.kind) || check.name.starts_with("z of ") {
+        CheckBasis::Statistical
+    } else if check.kind == "process" {
+        CheckBasis::Regression
+    } else if check.tolerance <= EXACT * scale {
+        CheckBasis::Exact
+    } else {
+        CheckBasis::Discretised
+    }
+}
+
+impl BasisCounts {
+    fn of(checks: &[Check]) -> Self {
+        let mut counts = Self::default();
+        for check in checks {
+            *match basis_of(check) {
+                CheckBasis::Exact => &mut counts.exact,
+                CheckBasis::Discretised => &mut counts.discretised,
+                CheckBasis::Statistical => &mut counts.statistical,
+                CheckBasis::Regression => &mut counts.regression,
+            } += 1;
+        }
+        counts
+    }
+
+    fn sentence(&self) -> String {
+        format!(
+            "{} exact within 1e-6, {} within the error of a discretisation or of printed digits, {} statistical, {} regressions",
+            self.exact, self.discretised, self.statistical, self.regression
+        )
+    }
 }
 
 /// A part of the battery: what it is about, and the crate's checks.
@@ -46,6 +110,7 @@ pub(crate) fn run(session: &Session) -> Result<Outcome, Failure> {
     let report = Report {
         schema: "intrados.verify/1",
         version: env!("CARGO_PKG_VERSION"),
+        bases: BasisCounts::of(&checks),
         checks,
         passed,
         failed,
@@ -73,5 +138,30 @@ impl Report {
         }
         output::table(&rows.map_rows())
             + &format!("{} passed, {} failed\n", self.passed, self.failed)
+            + &format!("Of all: {}.\n", self.bases.sentence())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn checks_are_counted_by_what_they_rest_on() {
+        let check = |kind, name: &str, expected, tolerance| {
+            Check::run(kind, name, expected, tolerance, || expected)
+        };
+        let checks = [
+            check("zero-variance", "largest error", 0.0, 1e-12),
+            check("birth", "first bar, Pa", 2e7, 1e-3),
+            check("Lamé", "hoop stress", 1.67, 0.02),
+            check("law", "slope", 2.0, 0.05),
+            check("windows", "z of the mean", 0.0, 3.2),
+            check("energy", "furnace", 3.3, 1e-9),
+            check("process", "log10 relVar", -5.0, 1.0),
+        ];
+        let counts = BasisCounts::of(&checks);
+        let found = [counts.exact, counts.discretised, counts.statistical, counts.regression];
+        assert_eq!(found, [2, 2, 2, 1]);
     }
 }

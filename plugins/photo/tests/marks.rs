@@ -57,22 +57,26 @@ fn score(folder: &str) -> [f64; 3] {
     [precision, recall, f1]
 }
 
-// The bounds hold what was reached (.69, .57, .74), not what is wanted: .70, .65, .82.
+// What was wanted is asserted, .70, .65 and .82, and where it is missed, that it is: by .799 on 24
+// November 2026. Thresholds and views were chosen on these pictures.
 
 #[test]
 #[ignore = "with_data: reads INTRADOS_DATA/photos"]
 fn hairlines_between_board_lines_with_data() {
-    assert!(score("uav75")[2] > 0.67);
+    assert!(score("uav75")[2] >= 0.70);
 }
 
 #[test]
 #[ignore = "with_data: reads INTRADOS_DATA/photos"]
 fn walls_with_data() {
-    assert!(score("walls")[2] > 0.55);
+    assert!(score("walls")[2] >= 0.65);
 }
 
+/// An expected miss: 2 % beside the recorded figure at most, and below what was wanted.
 #[test]
 #[ignore = "with_data: reads INTRADOS_DATA/photos"]
 fn paving_with_data() {
-    assert!(score("crackforest")[2] > 0.72);
+    let f1 = score("crackforest")[2];
+    assert!((f1 / 0.799 - 1.0).abs() <= 0.02, "{f1}, recorded .799");
+    assert!(f1 < 0.82, "{f1}: what was wanted is reached, assert that");
 }

@@ -2,7 +2,10 @@
 //! by fibres. Half of a member on two supports is computed: pressed along its axis first, then
 //! pushed at a third of its span, so that nothing but its own moment acts on its middle.
 
-use super::*;
+use super::{
+    record::{FigureCheck, MOMENT, recorded_meshes},
+    *,
+};
 
 /// Side of the section; half of the span, and from the support to the jack, m.
 const SIDE: f64 = 0.4;
@@ -127,11 +130,13 @@ impl Observer for Sag {
 #[ignore = "minutes"]
 fn bending_with_axial_force() {
     let only: Option<f64> = std::env::var("EXPERIMENT_ONLY").ok().map(|n| n.parse().unwrap());
+    let mut check = FigureCheck::default();
     for axial in [0.0, 1000.0, 2000.0, 3500.0] {
         if only.is_some_and(|n| n != axial) {
             continue;
         }
-        let element = sizes(&[0.0])[0];
+        let specimen = format!("N {axial:.0}");
+        let element = recorded_meshes(&specimen)[0];
         let mut sag = Sag::default();
         let life = jacked(&scene(axial), (element > 0.0).then_some(element), &mut sag);
         let found = life.strength.unwrap();
@@ -147,5 +152,7 @@ fn bending_with_axial_force() {
             found.because,
             found.ended
         );
+        check.compare(&specimen, MOMENT, element, 1e-3 * moment);
     }
+    check.finish();
 }

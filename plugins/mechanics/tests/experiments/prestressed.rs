@@ -144,8 +144,9 @@ fn a_post_tensioned_beam_in_bending() {
         );
         found.peak.load_n
     });
-    gate("grouted, kN", 1e-3 * bonded, 1e-3 * grouted, 0.05);
     println!("  not grouted over grouted: {:.3}", loose / bonded);
-    assert!((0.8..1.2).contains(&(bonded / grouted)), "{bonded} N, by fibres {grouted} N");
+    // No figure of ours was written down when it was last run, so that its gate alone is held.
+    let off = bonded / grouted - 1.0;
+    assert!(off.abs() <= 0.05, "{bonded} N, by fibres {grouted} N");
     assert!((0.9 * least..1.1 * grouted).contains(&loose), "{loose} N, {least} to {grouted} N");
 }

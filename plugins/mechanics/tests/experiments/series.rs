@@ -18,7 +18,10 @@
 use intrados_mechanics::strength::Strength;
 use intrados_stage::cpu_seconds;
 
-use super::*;
+use super::{
+    record::{FigureCheck, PEAK, recorded_meshes},
+    *,
+};
 
 /// Steel of a beam: diameters in mm, yield stresses in MPa.
 struct Inside {
@@ -291,12 +294,13 @@ pub(super) fn beside(
 fn beams_with_stirrups() {
     let only = std::env::var("EXPERIMENT_ONLY").ok();
     let mut ratios = Vec::new();
+    let mut check = FigureCheck::default();
     for beam in BEAMS.iter().filter(|b| only.as_deref().is_none_or(|o| o == b.name)) {
-        // 0 is the usual one.
-        let fine = 0.5 * (0.25e-3 * beam.size[0]).min(0.14);
-        for (n, element) in sizes(&[0.0, fine]).into_iter().enumerate() {
+        for (n, element) in recorded_meshes(beam.name).into_iter().enumerate() {
             let found = strength(&scene(beam), (element > 0.0).then_some(element));
             ratios.push(beside(beam.name, &found, 2.0, beam.measured, beam.mode));
+            check.compare(beam.name, PEAK, element, 2e-3 * found.peak.load_n);
+            check.compare_mode(beam.name, element, found.mode.words());
             let points =
                 found.curve.iter().map(|p| (1e3 * p.displacement_m, 2e-3 * p.load_n)).collect();
             draw(
@@ -312,10 +316,8 @@ fn beams_with_stirrups() {
                     },
                 ],
             );
-            if std::env::var_os("EXPERIMENT_COARSE").is_some() {
-                break;
-            }
         }
     }
     println!("  computed over measured: {ratios:.3?}");
+    check.finish();
 }
