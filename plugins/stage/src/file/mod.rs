@@ -1,6 +1,9 @@
 //! Files that are there whole or not at all: each is written beside its place and moved there once
 //! it is complete; and [`Set`]s of files of which the same is true.
 
+mod aside;
+mod inside;
+mod lock;
 mod names;
 mod set;
 
@@ -21,6 +24,9 @@ pub struct WriteError {
     pub source: io::Error,
 }
 
+pub use aside::AsideFolder;
+pub use inside::{remove_within, within};
+pub use lock::{FileLock, LockState};
 use names::hash;
 pub use names::{file_name, file_names};
 pub use set::Set;
