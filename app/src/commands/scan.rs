@@ -216,7 +216,9 @@ fn members<'a>(
     wanted: &[String],
 ) -> Result<Vec<Subject<'a>>, Failure> {
     let ids = if wanted.is_empty() { &scanner.members } else { wanted };
-    let find = |id: &String| {
+    let find = |word: &String| {
+        // An assembly of the scene is no member of its own: it is known by its id alone.
+        let id = scene.id_of(word).unwrap_or(word);
         Subject::of(scene, id).map_err(|_| {
             let known: Vec<&str> = scene
                 .structure

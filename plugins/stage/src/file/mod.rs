@@ -50,6 +50,8 @@ impl Unfinished {
         }
         let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
         let file = tempfile::Builder::new().prefix(".intrados-").tempfile_in(folder)?;
+        // Who finds one without its lock knows that its process was killed; some disks have none.
+        let _ = file.as_file().try_lock();
         Ok(Self { file: BufWriter::with_capacity(1 << 20, file), path: path.to_owned() })
     }
 

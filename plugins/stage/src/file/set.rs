@@ -185,7 +185,8 @@ impl Set {
     pub fn recall<T: DeserializeOwned>(&mut self, name: &str) -> Option<T> {
         let bytes = access::read(&self.record(name), LONGEST).ok()?;
         let part = ron::de::from_bytes::<Part<T>>(&bytes).ok()?;
-        let is_there = |file: &String| within(&self.aside, file).is_ok_and(|place| is_plain(&place));
+        let is_there =
+            |file: &String| within(&self.aside, file).is_ok_and(|place| is_plain(&place));
         if part.name != name || !part.files.iter().all(is_there) {
             return None;
         }
@@ -295,9 +296,24 @@ fn is_taken(folder: &Path, name: &str) -> bool {
     locks.any(|lock| matches!(FileLock::take_existing(&lock), Ok(LockState::Elsewhere)))
 }
 
-/// Removes what runs without a key left that were killed.
+/// Removes a file that was being written when its process was killed. What is younger than a minute
+/// may not have its lock yet.
+fn sweep_file(entry: &fs::DirEntry) {
+    let is_old = || entry.metadata().ok()?.modified().ok()?.elapsed().ok();
+    let is_ours = entry.file_name().to_string_lossy().starts_with(HIDDEN)
+        && entry.file_type().is_ok_and(|kind| kind.is_file());
+    if is_ours
+        && is_old().is_some_and(|age| age > PATIENCE)
+        && matches!(FileLock::take_existing(&entry.path()), Ok(LockState::Held(_)))
+    {
+        let _ = fs::remove_file(entry.path());
+    }
+}
+
+/// Removes what runs without a key left that were killed, and files that never came to their place.
 fn sweep(folder: &Path) {
     let Ok(entries) = fs::read_dir(folder) else { return };
+    let entries = entries.inspect(|entry| entry.as_ref().map_or((), sweep_file));
     for entry in
         entries.flatten().filter(|entry| entry.file_name().to_string_lossy().starts_with(NAMELESS))
     {
