@@ -430,6 +430,8 @@ impl Said<'_> {
 mod tests {
     use std::collections::BTreeSet;
 
+    use clap::error::ErrorKind;
+
     use super::*;
 
     /// Commands without commands of their own, by their words.
@@ -531,11 +533,15 @@ mod tests {
             return vec![format!("{}={}", of.shown(id), value.get_name())];
         }
         // The first that it reads.
-        let parser = arg.get_value_parser();
-        let value = values.iter().find(|value| {
-            parser.parse_ref(of.command, Some(arg), std::ffi::OsStr::new(value)).is_ok()
-        });
-        vec![format!("{}={}", of.shown(id), value.unwrap_or_else(|| panic!("{id}: no sample")))]
+        let said = |value: &str| format!("{}={value}", of.shown(id));
+        let reads = |value: &&&str| {
+            let words = ["x".to_owned(), said(value)];
+            let error = of.command.clone().try_get_matches_from(words).err();
+            let refused = [ErrorKind::ValueValidation, ErrorKind::InvalidValue];
+            error.is_none_or(|error| !refused.contains(&error.kind()))
+        };
+        let value = values.iter().find(reads);
+        vec![said(value.unwrap_or_else(|| panic!("{id}: no sample")))]
     }
 
     /// What a command needs in any case, unless it is said already.

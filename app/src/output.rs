@@ -73,7 +73,7 @@ pub(crate) fn may_begin(folder: &Path) -> Result<(), Failure> {
 /// A folder within another one, in which files may be written: what a link leads to elsewhere is
 /// another's.
 pub(crate) fn inner(folder: &Path, name: impl AsRef<Path>) -> Result<PathBuf, Failure> {
-    let refused = |e: io::Error| Failure::CannotWrite(e.to_string());
+    let refused = |e: io::Error| Failure::cannot_write(&folder.join(name.as_ref()), e);
     let place = file::within(folder, name.as_ref()).map_err(refused)?;
     file::within(folder, name.as_ref().join("any")).map_err(refused)?;
     Ok(place)

@@ -175,7 +175,8 @@ fn links_to_folders_are_refused() {
         let (code, said) = all.tried(line);
         assert!([2, 65, 66, 73].contains(&code), "{from}, {line}: {code} {said}");
         let last = from.rsplit('/').next().unwrap();
-        assert!(said.lines().count() == 1 && said.contains(last), "{from}, {line}: {said}");
+        // Of a campaign's units each is told, and the first again as the command's own.
+        assert!(said.lines().count() <= 2 && said.contains(last), "{from}, {line}: {said}");
     }
 }
 
@@ -209,7 +210,7 @@ fn a_unit_is_worked_on_in_the_campaign_alone() {
         let (code, said) = all.tried("campaign status c");
         assert_eq!(code, 0, "{said}");
         let (code, said) = all.tried("campaign run c --quiet");
-        assert_eq!((code, said.lines().count()), (73, 1), "{to} {place}: {said}");
+        assert!(code == 73 && said.lines().count() <= 2, "{to} {place}: {code} {said}");
     }
 }
 

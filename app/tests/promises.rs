@@ -173,7 +173,7 @@ fn names_do_nothing_to_a_terminal() {
             let output = run(args);
             for stream in [&output.stdout, &output.stderr] {
                 let told = String::from_utf8_lossy(stream);
-                let steers = |c: char| c.is_control() && c != '\n' || c == '\u{202e}';
+                let steers = |c: char| (c.is_control() && c != '\n') || c == '\u{202e}';
                 assert!(!told.contains(steers), "{args:?}: {told:?}");
                 shown += told.len();
             }
@@ -242,6 +242,7 @@ fn unused_options_are_refused() {
         ("experiment calibration --cases 1..2", ["--cases", "calibration"]),
         ("campaign new d --command measure --over door --now 2030", ["--now", ".csv"]),
         ("photo column --corners C1 --spp 9", ["--spp", "--corners"]),
+        ("scan --sinogram x.tif --correct scatter", ["--correct", "SCENE"]),
         ("render column --replay 1,1,1 --spp 3", ["--spp", "--replay"]),
     ] {
         let output = run(&line.split(' ').collect::<Vec<_>>());

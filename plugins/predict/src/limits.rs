@@ -50,10 +50,9 @@ pub fn unused_conditions(scene: &Scene) -> Vec<String> {
         ));
     }
     // EN 206-1, table F.1: the water/cement ratio, which durability goes by, ends at these classes.
-    for (is_beyond, water, class) in [
-        ((|fck| fck > 35.0) as fn(f32) -> bool, ".45", "C35/45"),
-        (|fck| fck < 25.0, ".60", "C25/30"),
-    ] {
+    let ends: [(fn(f32) -> bool, &str, &str); 2] =
+        [(|fck| fck > 35.0, ".45", "C35/45"), (|fck| fck < 25.0, ".60", "C25/30")];
+    for (is_beyond, water, class) in ends {
         let beyond = |a: &&&Assembly| strength_of(&a.concrete).is_some_and(is_beyond);
         let those: Vec<&&Assembly> = attacked.iter().filter(beyond).collect();
         if let [first, ..] = those[..] {

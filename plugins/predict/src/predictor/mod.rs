@@ -307,7 +307,7 @@ impl Predictor {
         &mut self,
         scene: &Scene,
         job: &Job,
-        keep: &KeepLife,
+        keep: &KeepLife<'_>,
     ) -> Result<bool, PredictError> {
         let Some(item) = self.queue.get(self.next).cloned() else { return Ok(false) };
         if scene.hash != self.hash || scene.members.len() != self.readings.len() {
@@ -378,7 +378,7 @@ impl Predictor {
         scene: &Scene,
         models: &[String],
         job: &Job,
-        keep: &KeepLife,
+        keep: &KeepLife<'_>,
     ) -> Result<(), PredictError> {
         let Some(settings) = self.settings.forecast else { return Ok(()) };
         let settings = ForecastSettings { work: settings.work.or(Some(self.share())), ..settings };
