@@ -37,9 +37,12 @@ Exit codes: 0 done, 1 internal error or a failed check, 2 wrong usage, 3 target 
 73 cannot write, 75 a unit of a campaign that is to be started again, 130 interrupted.
 
 Interrupted by Ctrl-C or SIGTERM, render and measure write what they have reached and mark it; predict, scan, analyze and experiment table-3-1
-(with --out) keep their finished parts in that folder, killed ones too, and the same command goes on from them; what analyze has reached besides is
+(with --out) keep their finished parts in that folder, killed ones too, and the same command goes on from them: slices, what gauges and surveys say,
+and each life once all of it is computed (minutes; a life that is broken off, and photographs, are begun again). What analyze has reached besides is
 in the folder `stopped` within it. A second signal ends at once.
-The files of a run come to their folder all at once, the JSON that lists them last: a list that is there names files of one run.
+The files of a run come to their folder all at once, the JSON that lists them last: a list that is there names files of one run. While such a run
+works, another one into the same folder is refused (73).
+An option that a run would not use is refused (2).
 
 Examples:
   intrados render column                          a picture of the bundled column
@@ -890,6 +893,9 @@ pub(crate) struct Analyze {
     /// Folder for VTU, PVD, CSV and JSON; nothing is written if absent
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
+    /// What was given of the options that belong to decks and scenes of members, as it is written.
+    #[arg(skip)]
+    pub(crate) of_members: Vec<String>,
 }
 
 fn widening(text: &str) -> Result<f32, String> {

@@ -178,12 +178,14 @@ impl Shooting {
         let mut actions = world.resource_mut::<Actions>();
         self.shot.then.iter().for_each(|action| actions.ask(action.clone()));
         if let Some(word) = &self.shot.member {
-            match scene.members.iter().position(|m| m.id == *word || m.name == *word) {
-                Some(index) => actions.ask(Action::Select(Some(index))),
-                None => {
-                    let why = format!("{word}: is no member of {}", scene.name);
-                    return self.end(Err(why));
+            let id = scene.id_of(word);
+            match (id, id.ok().and_then(|id| scene.members.iter().position(|m| m.id == id))) {
+                (_, Some(index)) => actions.ask(Action::Select(Some(index))),
+                (Err(several @ 2..), _) => {
+                    return self
+                        .end(Err(format!("{several} members are called {word}: give an id")));
                 }
+                _ => return self.end(Err(format!("{word}: is no member of {}", scene.name))),
             }
         }
         let is_predicted = !scene.members.is_empty();

@@ -6,7 +6,7 @@ use std::{
     sync::{Arc, Mutex, PoisonError},
 };
 
-use clap::{Parser, error::ErrorKind};
+use clap::error::ErrorKind;
 use intrados_ct::SliceError;
 use intrados_scene::Scene;
 use intrados_stage::{Access, Job, catch};
@@ -16,6 +16,7 @@ use crate::{
     commands,
     console::one_line,
     failure::{Failure, Outcome},
+    options::{self, Unread},
     processor,
     session::Session,
 };
@@ -69,7 +70,10 @@ pub fn answer(
 ) -> Result<String, Refusal> {
     let words: Vec<OsString> =
         std::iter::once("intrados".into()).chain(words.iter().cloned()).collect();
-    let cli = Cli::try_parse_from(&words).map_err(|why| Refusal::from(usage(&why)))?;
+    let cli = options::read(words.clone()).map_err(|why| match why {
+        Unread::Words(error) => Refusal::from(usage(&error)),
+        Unread::Unused(line) => Failure::Usage(line).into(),
+    })?;
     guarded(|| {
         let heard = Arc::new(Mutex::new(String::new()));
         let session =

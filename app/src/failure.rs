@@ -203,6 +203,7 @@ impl From<RecordError> for Failure {
             RecordError::Write(error) => error.into(),
             RecordError::Model(error) => error.into(),
             RecordError::Pdf(error) => error.into(),
+            RecordError::Changed(_) => Self::BadInput(error.to_string()),
             RecordError::Cancelled(cancelled) => cancelled.into(),
         }
     }

@@ -27,6 +27,7 @@ pub mod desktop;
 mod drive;
 pub mod embedded;
 mod failure;
+mod options;
 mod output;
 mod picture;
 mod processor;
@@ -40,7 +41,6 @@ use std::{process::ExitCode, sync::Arc};
 use ahash as _;
 
 use bevy_app::App;
-use clap::Parser;
 use intrados_ct::detect::{self, Method};
 use intrados_predict::PredictSettings;
 
@@ -57,8 +57,14 @@ type Build = Arc<dyn Fn() -> App + Send + Sync>;
 /// A function of its own: nothing of it may be moved before the check.
 #[inline(never)]
 fn run(build: Build) -> ExitCode {
-    let cli = args::Cli::parse();
-    session::run(&cli, build, commands::run)
+    match options::read(std::env::args_os()) {
+        Ok(cli) => session::run(&cli, build, commands::run),
+        Err(options::Unread::Words(error)) => error.exit(),
+        Err(options::Unread::Unused(line)) => {
+            console::say(format_args!("intrados: {line}"));
+            ExitCode::from(failure::Failure::Usage(line).code())
+        }
+    }
 }
 
 /// All plugins that know no window. Add your own to it, and call [`App::update`] for each frame.

@@ -13,6 +13,7 @@ use serde::Serialize;
 
 use crate::{
     args::Format,
+    console::{printable, printable_json},
     failure::Failure,
     session::{Listener, Session},
 };
@@ -30,8 +31,8 @@ impl Session {
                 *answer.lock().unwrap_or_else(PoisonError::into_inner) = json(result)?;
                 Ok(())
             }
-            (Listener::User, Format::Table) => say(&table()),
-            (Listener::User, Format::Json) => say(&json(result)?),
+            (Listener::User, Format::Table) => say(&printable(&table())),
+            (Listener::User, Format::Json) => say(&printable_json(&json(result)?)),
         }
     }
 }
@@ -61,6 +62,21 @@ pub(crate) fn json(result: &impl Serialize) -> Result<String, Failure> {
 /// Makes a folder, and those above it.
 pub(crate) fn folder(path: &Path) -> Result<(), Failure> {
     fs::create_dir_all(path).map_err(|e| Failure::cannot_write(path, e))
+}
+
+/// Finds out before the work whether files can be written into a folder. What is made of it for
+/// that goes again where it is empty.
+pub(crate) fn may_begin(folder: &Path) -> Result<(), Failure> {
+    begin(folder).map(drop)
+}
+
+/// A folder within another one, in which files may be written: what a link leads to elsewhere is
+/// another's.
+pub(crate) fn inner(folder: &Path, name: impl AsRef<Path>) -> Result<PathBuf, Failure> {
+    let refused = |e: io::Error| Failure::cannot_write(&folder.join(name.as_ref()), e);
+    let place = file::within(folder, name.as_ref()).map_err(refused)?;
+    file::within(folder, name.as_ref().join("any")).map_err(refused)?;
+    Ok(place)
 }
 
 /// Writes a file beside its place and moves it there, so that nobody ever sees half of it.
@@ -136,6 +152,9 @@ pub(crate) fn in_shared_parts<T>(
                     "{parts} finished parts are kept in {}: the same command goes on from them",
                     folder.display()
                 ));
+            } else if matches!(broken_off, Failure::Interrupted) {
+                session
+                    .note("no part was finished that could be kept: the same command begins anew");
             }
             Err(broken_off)
         }

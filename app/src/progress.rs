@@ -10,7 +10,7 @@ use std::{
 use indicatif::{ProgressBar, ProgressStyle};
 use intrados_stage::Job;
 
-use crate::console::say;
+use crate::console::{printable, say};
 
 /// Shows a job until it is dropped.
 pub(crate) struct Progress(Option<(Sender<()>, JoinHandle<()>)>);
@@ -63,7 +63,7 @@ fn bar() -> Box<dyn FnMut(&Job)> {
     let bar = Bar(ProgressBar::new(STEPS).with_style(style));
     Box::new(move |job| {
         bar.0.set_position((f64::from(job.done()) * STEPS as f64) as u64);
-        bar.0.set_message(job.label());
+        bar.0.set_message(printable(&job.label()).replace('\n', " "));
     })
 }
 

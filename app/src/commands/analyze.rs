@@ -23,7 +23,8 @@ use intrados_mechanics::{
     strength::{CurvePoint, Strength},
     stretch::Stretch,
 };
-use intrados_scene::{Assembly, Scene, SurfaceDamage, SurfaceFile};
+use intrados_predict::unused_conditions;
+use intrados_scene::{Assembly, Damage, Scene, SurfaceDamage, SurfaceFile};
 use intrados_stage::{
     cpu_seconds,
     file::{Set, WriteError, file_name, file_names},
@@ -63,6 +64,9 @@ struct Report {
     members: Vec<MemberOutcome>,
     gauges: Vec<GaugeOutcome>,
     models: Vec<Life>,
+    /// What the scene says and nothing here uses, with the reasons.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    notes: Vec<String>,
     /// All members as one, where that was asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     whole: Option<Whole>,
@@ -80,6 +84,8 @@ struct Work {
     is_scene: bool,
     /// Names of the scene's loads that may be raised until members fail.
     loads: Vec<String>,
+    /// What the scene says and nothing here uses.
+    notes: Vec<String>,
     prepared: Vec<Prepared>,
     /// Of one member of which a stretch is wanted: all of it in the stretch's bricks, and its axes.
     fine: Option<Box<(Prepared, Axes)>>,
@@ -158,11 +164,8 @@ pub(crate) fn run(session: &Session, args: &args::Analyze) -> Result<Outcome, Fa
 
 /// All members of a scene as one frame.
 fn as_one(session: &Session, args: &args::Analyze) -> Result<Outcome, Failure> {
-    let alone = [(args.units.is_some(), "--units"), (args.element.is_some(), "--element")];
-    if let Some((_, option)) = alone.into_iter().find(|(given, _)| *given) {
-        return Err(Failure::Usage(format!(
-            "{option} with --whole: a frame has no bricks; name a --member that takes what the others do to it"
-        )));
+    if let Some(out) = &args.out {
+        output::may_begin(out)?;
     }
     let begin = cpu_seconds();
     let scene = walks::load(session, &args.scene)?;
@@ -170,6 +173,7 @@ fn as_one(session: &Session, args: &args::Analyze) -> Result<Outcome, Failure> {
     let mut report = Report {
         scene: scene.name.clone(),
         scene_hash: scene.hash.clone(),
+        notes: unused_truth(&scene).into_iter().collect(),
         dof: found.unknowns,
         elements: found.beams + found.plates,
         solver: "direct".into(),
@@ -192,10 +196,43 @@ fn as_one(session: &Session, args: &args::Analyze) -> Result<Outcome, Failure> {
     }
     session.print(&report, || {
         let mut text = report.whole.as_ref().map_or_else(String::new, |w| whole::table(w, &scene));
+        report.notes.iter().for_each(|n| text += &format!("note: {n}\n"));
         report.files.iter().for_each(|f| text += &format!("file {f}\n"));
         text
     })?;
     Ok(Outcome::Done)
+}
+
+/// What a scene says that no life here depends on.
+fn unused(scene: &Scene) -> Vec<String> {
+    unused_truth(scene).into_iter().chain(unused_conditions(scene)).collect()
+}
+
+/// Planted damage, which nothing here is computed with.
+fn unused_truth(scene: &Scene) -> Option<String> {
+    let mut planted = scene.members.iter().filter(|m| !m.truth.is_empty());
+    let first = planted.next()?;
+    let more = match planted.count() {
+        0 => String::new(),
+        n => format!(" and {n} more"),
+    };
+    let kinds: BTreeSet<&str> = scene.members.iter().flat_map(|m| &m.truth).map(kind_of).collect();
+    Some(format!(
+        "The truth of {}{more} ({}) is not used, because members are computed as they are drawn, sound at first: give loads and exposure that damage them, or `predict`, which holds its result against the truth.",
+        first.name,
+        Vec::from_iter(kinds).join(", ")
+    ))
+}
+
+fn kind_of(damage: &Damage) -> &'static str {
+    match damage {
+        Damage::Crack { .. } => "cracks",
+        Damage::Voids { .. } => "voids",
+        Damage::Honeycomb { .. } => "honeycomb",
+        Damage::Spall { .. } => "spalls",
+        Damage::Corrosion { .. } => "corrosion",
+        Damage::Softened { .. } => "lost stiffness",
+    }
 }
 
 fn told(session: &Session, report: &Report) -> Result<Outcome, Failure> {
@@ -300,12 +337,6 @@ fn extension(path: &Path) -> Option<String> {
 
 /// The members of a scene.
 fn scene(session: &Session, args: &args::Analyze) -> Result<Work, Failure> {
-    if args.units.is_some() {
-        return Err(Failure::Usage("--units is for decks (.inp): a scene says its units".into()));
-    }
-    if args.groups.is_some() {
-        return Err(Failure::Usage("--groups is for Gmsh meshes (.msh)".into()));
-    }
     let scene = walks::load(session, &args.scene)?;
     let structure = &scene.structure;
     let known: BTreeSet<&str> = structure.assemblies.iter().map(|a| a.id.as_str()).collect();
@@ -367,7 +398,9 @@ fn scene(session: &Session, args: &args::Analyze) -> Result<Work, Failure> {
         known.iter().map(|id| (*id).to_owned()).zip(file_names(&Vec::from_iter(&known))).collect();
     let loads = structure.loads.iter().filter(|l| l.action.can_be_raised());
     let loads = loads.map(|l| l.name.clone()).collect();
-    Ok(Work { name: scene.name, hash: scene.hash, is_scene: true, loads, prepared, fine, names })
+    let notes = unused(&scene);
+    let (name, hash) = (scene.name, scene.hash);
+    Ok(Work { name, hash, is_scene: true, loads, notes, prepared, fine, names })
 }
 
 /// The assembly that somebody calls so, by id or name.
@@ -427,18 +460,6 @@ fn deck(args: &args::Analyze, kind: &str) -> Result<Read, Failure> {
             path.display()
         )));
     };
-    for (given, option) in
-        [(!args.member.is_empty(), "--member"), (args.element.is_some(), "--element")]
-    {
-        if given {
-            return Err(Failure::Usage(format!(
-                "{option} is for scenes: a deck is computed as it is written"
-            )));
-        }
-    }
-    if kind == "inp" && args.groups.is_some() {
-        return Err(Failure::Usage("--groups is for Gmsh meshes (.msh)".into()));
-    }
     let bytes = read::bytes(path)?;
     let hash = blake3::hash(&bytes).to_hex().to_string();
     let name =
@@ -463,6 +484,7 @@ fn deck(args: &args::Analyze, kind: &str) -> Result<Read, Failure> {
         hash,
         is_scene: false,
         loads: Vec::new(),
+        notes: Vec::new(),
     }))
 }
 
@@ -524,7 +546,7 @@ fn keep_so_far(session: &Session, files: &Set, mut report: Report) -> Result<(),
     if report.models.is_empty() || session.is_embedded() {
         return Ok(());
     }
-    let folder = files.folder().join(STOPPED);
+    let folder = output::inner(files.folder(), STOPPED)?;
     let mut so_far = output::begin(&folder)?;
     files.copy_into(&mut so_far).map_err(|e| Failure::cannot_write(&folder, e))?;
     report.stopped = true;
@@ -597,6 +619,7 @@ impl Default for Report {
             members: Vec::new(),
             gauges: Vec::new(),
             models: Vec::new(),
+            notes: Vec::new(),
             whole: None,
             stopped: false,
             files: Vec::new(),
@@ -626,6 +649,7 @@ impl Report {
             members: models.iter().flat_map(|m| m.members.clone()).collect(),
             gauges: models.iter().flat_map(|m| m.gauges.clone()).collect(),
             models,
+            notes: work.notes.clone(),
             ..Self::default()
         }
     }
@@ -715,6 +739,7 @@ impl Report {
             m.warnings.iter().for_each(|w| text += &format!("  WARNING: {w}\n"));
             m.notes.iter().for_each(|n| text += &format!("  note: {n}\n"));
         }
+        self.notes.iter().for_each(|n| text += &format!("note: {n}\n"));
         text += &format!("{:.1} CPU-seconds\n", self.cpu_seconds);
         self.files.iter().for_each(|f| text += &format!("file {f}\n"));
         text

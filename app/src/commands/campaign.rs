@@ -248,7 +248,10 @@ fn collect(session: &Session, args: &args::CampaignCollect) -> Result<Outcome, F
     let folder = Folder::new(&args.dir);
     let plan = folder.plan()?;
     let all = collect::collect(session, &folder, &plan, args.partial)?;
-    let out = args.out.clone().unwrap_or_else(|| args.dir.join("collected"));
+    let out = match &args.out {
+        Some(out) => out.clone(),
+        None => output::inner(&args.dir, "collected")?,
+    };
     let mut files = output::begin(&out)?;
     let results = Results {
         schema: "intrados.campaign-results/1",
@@ -305,7 +308,7 @@ fn pictures(all: &Collected, out: &Path) -> Result<Vec<String>, Failure> {
     for ((_, sum), name) in all.pictures.iter().zip(all.folders()) {
         if let Content::Picture { plate, exposure } = &sum.content {
             let mut report = render::Report::of(sum, plate);
-            render::write(&mut report, plate, *exposure, &out.join(name))?;
+            render::write(&mut report, plate, *exposure, &output::inner(out, name)?)?;
             files.extend(report.files);
         }
     }
@@ -366,7 +369,7 @@ fn launch(session: &Session, args: &args::CampaignLaunch) -> Result<Outcome, Fai
         claim: args.claim.clone(),
     };
     let job = launch::job_files(&folder, &plan, &wish)?;
-    let place = args.dir.join("launch").join(job.folder);
+    let place = output::inner(&args.dir, Path::new("launch").join(job.folder))?;
     output::folder(&place)?;
     let mut written = Vec::new();
     for (name, text) in &job.files {

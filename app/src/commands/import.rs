@@ -2,7 +2,10 @@
 
 use std::path::PathBuf;
 
-use intrados_scene::import::{self, Imported, Told};
+use intrados_scene::{
+    MemberKind,
+    import::{self, Imported, Told},
+};
 use serde::Serialize;
 
 use super::{info::kind_name, render::MapRows};
@@ -40,6 +43,9 @@ pub(crate) fn run(session: &Session, args: &args::Import) -> Result<Outcome, Fai
     let imported = import::import(&args.model, &folder, &told, &session.access, &session.job)?;
     drop(progress);
     imported.notes.iter().for_each(|note| session.note(note));
+    if args.imposed.is_some() && !imported.members.contains_key(&MemberKind::Slab) {
+        session.note("--imposed is not used, because the model has no slab that it could lie on: add loads to scene.ron");
+    }
     let report = Report {
         schema: "intrados.import/1",
         version: env!("CARGO_PKG_VERSION"),

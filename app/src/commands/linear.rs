@@ -62,15 +62,14 @@ pub(crate) fn run(
     args: &args::Analyze,
     read: &Read,
 ) -> Result<Outcome, Failure> {
-    let of_members = [
-        (args.to_failure.is_some(), "--to-failure"),
-        (args.crack_law.is_some(), "--crack-law"),
-        (args.tolerance.is_some(), "--tolerance"),
-    ];
-    if let Some((_, option)) = of_members.into_iter().find(|(given, _)| *given) {
+    if let Some(option) = args.of_members.first() {
         return Err(Failure::Usage(format!(
-            "{option}: this is no deck of members, to which that belongs"
+            "{option} does nothing with {}, a deck of solids, which is computed as linear: leave {option} out",
+            args.scene.display()
         )));
+    }
+    if let Some(out) = &args.out {
+        output::may_begin(out)?;
     }
     let begin = cpu_seconds();
     let _progress = session.watch(read.name.clone());

@@ -155,6 +155,13 @@ impl Work for Readings<'_> {
 pub(crate) fn run(session: &Session, args: &args::Measure) -> Result<Outcome, Failure> {
     let opened = walks::open(session, &args.scene)?;
     let sensors = sensors(&opened.scene, args)?;
+    let is_sized = args.size.width.is_some() || args.size.height.is_some();
+    if is_sized && !sensors.iter().any(|sensor| matches!(sensor, Sensor::Camera(_))) {
+        return Err(Failure::Usage(
+            "--width and --height do nothing with meters alone: leave them out, or name a camera (--sensor)"
+                .into(),
+        ));
+    }
     let rule = walks::rule(&opened.scene, &args.light);
     let sides = args.light.side.map_or(Sides::Both, Into::into);
     let shard = walks::shard(&args.keep);

@@ -23,6 +23,12 @@ pub(crate) fn run(session: &Session, args: &args::Merge) -> Result<Outcome, Fail
             render::write(&mut report, plate, args.exposure.unwrap_or(*exposure), &args.out)?;
             session.print(&report, || report.table())?;
         }
+        Content::Readings { .. } if args.exposure.is_some() => {
+            return Err(Failure::Usage(
+                "--exposure does nothing with readings, of which no picture is made: leave it out"
+                    .into(),
+            ));
+        }
         Content::Readings { .. } => {
             let mut report = measure::Report::of(&sum)?;
             report.write(output::begin(&args.out)?)?;

@@ -33,7 +33,8 @@ pub(crate) fn run(session: &Session, args: &args::New) -> Result<Outcome, Failur
     let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
     let evidence = evidence_template(&args.kind, &name).filter(|_| is_scene);
     let beside = path.with_extension("evidence.ron");
-    let taken = |place: &Path| place.exists() && !args.force;
+    let is_there = |place: &Path| std::fs::symlink_metadata(place).is_ok();
+    let taken = |place: &Path| is_there(place) && !args.force;
     if let Some(place) =
         [&path, &beside].into_iter().take(1 + usize::from(is_scene)).find(|p| taken(p))
     {
@@ -42,7 +43,7 @@ pub(crate) fn run(session: &Session, args: &args::New) -> Result<Outcome, Failur
     match path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).as_deref() {
         Some("ron") => {
             let evidence = evidence.as_deref().unwrap_or_default();
-            let was_there = beside.exists();
+            let was_there = is_there(&beside);
             output::put(&beside, evidence.as_bytes())?;
             output::put(&path, text.as_bytes()).inspect_err(|_| {
                 if !was_there {

@@ -12,9 +12,9 @@ use intrados_damage::{
 use intrados_forecast as forecast;
 use intrados_light::{LitScene, plugin::Lit};
 use intrados_predict::{PredictSettings, Predicting, Prediction, Progress};
-use intrados_report::{Document, Record, check_model, pdf};
+use intrados_report::{Document, Record, RecordError, check_model, pdf};
 use intrados_scene::{Scene, plugin::install, structure::Project};
-use intrados_stage::{Jobs, Pace};
+use intrados_stage::{Job, Jobs, Pace};
 
 use super::{info::kind_name, render::MapRows, walks};
 use crate::{
@@ -29,7 +29,7 @@ pub(crate) fn run(session: &Session, args: &args::Predict) -> Result<Outcome, Fa
     let mut scene = walks::load(session, &args.scene)?;
     put_on(&mut Arc::make_mut(&mut scene.structure).project, &args.cover);
     if let Some(model) = &args.ifc {
-        check_model(model, &scene)?;
+        check_model(model, &scene, &session.job)?;
     }
     // Not after an hour's work.
     if args.pdf && pdf::printer().is_none() {
@@ -59,8 +59,9 @@ pub(crate) fn run(session: &Session, args: &args::Predict) -> Result<Outcome, Fa
         settings.strict,
     );
     let (parts, document) = output::in_shared_parts(session, &args.out, &key, |parts| {
+        let _progress = session.watch(format!("the evidence of {}", scene.name));
         let (prediction, lit) = predicted(session, scene, settings.clone(), parts)?;
-        let _progress = session.watch("the report");
+        session.job.relabel("the report");
         let record = Record {
             command: command(&session.words),
             samples: args.spp,
@@ -68,7 +69,7 @@ pub(crate) fn run(session: &Session, args: &args::Predict) -> Result<Outcome, Fa
             ifc: args.ifc.clone(),
             pdf: args.pdf,
         };
-        Ok(record.make(&args.out, &lit, prediction, &session.job)?)
+        Ok(record.make(&args.out, &lit, prediction, &session.job.part(EVIDENCE, 1.0))?)
     })?;
     output::locked(&parts).forget();
     session.print(&document, || table(&document))?;
@@ -93,6 +94,9 @@ fn put_on(project: &mut Project, cover: &args::Cover) {
     project.inspected = inspected.or(project.inspected);
 }
 
+/// Share of the progress that reading the evidence takes; the rest is the report's.
+const EVIDENCE: f64 = 0.9;
+
 /// Between two looks at the app's queue.
 const FRAME: Duration = Duration::from_millis(2);
 
@@ -104,7 +108,7 @@ fn predicted(
     settings: PredictSettings,
     parts: &Shared,
 ) -> Result<(Prediction, Arc<LitScene>), Failure> {
-    let _progress = session.watch(format!("the evidence of {}", scene.name));
+    let sources = scene.sources.clone();
     let mut app = (session.build)();
     let profile = Some(settings.profile.clone());
     app.insert_resource(Pace::Unwatched).insert_resource(session.access.clone());
@@ -115,8 +119,15 @@ fn predicted(
         ..Predicting::default()
     });
     install(app.world_mut(), scene);
-    drain(session, &mut app)?;
-    session.job.step(1, 1)?;
+    let drained = drain(session, &mut app);
+    // What was kept of files that are others by now is of no use to the next run.
+    if let (Err(Failure::Interrupted), Ok(Some(path))) =
+        (&drained, sources.first_changed(&Job::default()))
+    {
+        return Err(RecordError::Changed(path.to_owned()).into());
+    }
+    drained?;
+    session.job.check()?;
     let prediction = app.world().resource::<Progress>().prediction();
     let lit = app.world().get_resource::<Lit>().map(|lit| Arc::clone(&lit.0));
     prediction
@@ -126,6 +137,8 @@ fn predicted(
 
 /// Updates the app until nothing is left to predict and the scene is ready for light.
 fn drain(session: &Session, app: &mut App) -> Result<(), Failure> {
+    // A part of a job never goes back, and every piece begins with a job of its own.
+    let whole = session.job.part(0.0, EVIDENCE);
     loop {
         app.update();
         let has_light = app.world().contains_resource::<Lit>();
@@ -133,7 +146,7 @@ fn drain(session: &Session, app: &mut App) -> Result<(), Failure> {
         let job = progress.job().cloned();
         if let Some(job) = &job {
             session.job.relabel(job.label());
-            if session.job.step((1e4 * job.done()) as usize, 10_000).is_err() {
+            if whole.step((1e4 * job.done()) as usize, 10_000).is_err() {
                 job.cancel();
             }
         }

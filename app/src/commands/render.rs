@@ -150,7 +150,14 @@ pub(crate) fn run(session: &Session, args: &args::Render) -> Result<Outcome, Fai
         orders: true,
     };
     let sensors = [Sensor::Camera(camera.clone())];
-    let guide = if is_long(args, &rules, &camera) {
+    let is_steered = is_long(args, &rules, &camera);
+    if let (Some(file), false) = (&args.light.guide_from, is_steered) {
+        session.note(format_args!(
+            "{}: nothing is learnt into it, since so few walks would not pay for it: --guide on learns all the same",
+            file.display()
+        ));
+    }
+    let guide = if is_steered {
         walks::guide(session, &opened.lit, &sensors, rule, &args.light, &rules)?
             .map(|guide| Arc::new(guide.for_picture()))
     } else {
@@ -210,6 +217,7 @@ fn is_long(args: &args::Render, rules: &Rules, camera: &Camera) -> bool {
     let pixels = u64::from(camera.width) * u64::from(camera.height);
     let walks = rules.spp.map_or(u64::MAX, |spp| spp.saturating_mul(pixels));
     Steering::from(args.light.guide) == Steering::On
+        || args.light.guide_from.as_deref().is_some_and(Path::exists)
         || (walks >= LONG && rules.time.is_none_or(|t| t.as_secs() >= 10))
 }
 

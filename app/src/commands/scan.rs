@@ -216,7 +216,9 @@ fn members<'a>(
     wanted: &[String],
 ) -> Result<Vec<Subject<'a>>, Failure> {
     let ids = if wanted.is_empty() { &scanner.members } else { wanted };
-    let find = |id: &String| {
+    let find = |word: &String| {
+        // An assembly of the scene is no member of its own: it is known by its id alone.
+        let id = scene.id_of(word).unwrap_or(word);
         Subject::of(scene, id).map_err(|_| {
             let known: Vec<&str> = scene
                 .structure
@@ -446,6 +448,15 @@ fn grey(slice: &[f32], width: usize, [low, high]: [f32; 2]) -> Vec<[u8; 3]> {
 /// Reconstructs line integrals that somebody else has measured, slab by slab: neither they nor the
 /// slices need to fit into memory.
 fn given(session: &Session, args: &args::Scan, path: &Path) -> Result<Outcome, Failure> {
+    let Corrections { scatter, hardening, metal, rings } = args.correct;
+    // All of them is what is done unless somebody says otherwise.
+    let is_all = scatter && hardening && metal && rings;
+    if (scatter || hardening || metal) && !is_all {
+        return Err(Failure::Usage(
+            "--correct: scatter, hardening and metal need the SCENE that draws what --sinogram is of: name it with --member and --along, or give --correct rings"
+                .into(),
+        ));
+    }
     let _progress = session.watch(format!("reading {}", path.display()));
     let begin = cpu_seconds();
     let pixel = args.given.pixel_mm.map(|mm| [1e-3 * mm; 3]);

@@ -17,7 +17,7 @@ pub use defect::{Defect, Found};
 pub use error::PredictError;
 pub use foreseen::foreseen;
 pub use intrados_ct::source::Origin;
-pub use limits::doubted;
+pub use limits::{doubted, unused_conditions};
 pub use plugin::{PredictPlugin, Predicted, Predicting, Progress};
 pub use prediction::{
     CrackCheck, MemberFailure, MemberPrediction, MissingEvidence, Prediction, Truth,

@@ -9,7 +9,10 @@ use intrados_damage::{
     verdict::{Basis, NAMED},
 };
 use intrados_forecast::{FORECAST, MODEL_ERROR};
-use intrados_scene::{Scene, structure::Matter};
+use intrados_scene::{
+    Assembly, Scene,
+    structure::{Climate, Matter},
+};
 
 use crate::{Origin, prediction::MemberPrediction};
 
@@ -24,6 +27,63 @@ pub fn doubted(scene: &Scene) -> Vec<(String, String)> {
         ))
     };
     SliceSource::all(scene).into_iter().filter_map(doubt).collect()
+}
+
+/// What a scene says of the air and of concrete that the rust of its bars does not depend on here,
+/// each with the reason.
+#[must_use]
+pub fn unused_conditions(scene: &Scene) -> Vec<String> {
+    let by_class = |a: &&Assembly| {
+        a.exposure.as_ref().is_some_and(|e| {
+            e.chloride.is_none() && e.classes().any(|c| c.starts_with("XC") || is_of_salt(c))
+        })
+    };
+    let attacked: Vec<&Assembly> = scene.structure.assemblies.iter().filter(by_class).collect();
+    let given = scene.structure.climate.humidity_percent;
+    let mut unused = Vec::new();
+    if let ([first, ..], true) =
+        (&attacked[..], given.to_bits() != Climate::default().humidity_percent.to_bits())
+    {
+        unused.push(format!(
+            "The climate's humidity of {given} % is not used for rust, because an exposure class has its own (65 % in XC1, 90 % in XC2, 75 % in XC3, 80 % in XC4; of chloride none): {}. Shrinkage and creep use it.",
+            among(scene, first, attacked.len())
+        ));
+    }
+    // EN 206-1, table F.1: the water/cement ratio, which durability goes by, ends at these classes.
+    let ends: [(fn(f32) -> bool, &str, &str); 2] =
+        [(|fck| fck > 35.0, ".45", "C35/45"), (|fck| fck < 25.0, ".60", "C25/30")];
+    for (is_beyond, water, class) in ends {
+        let beyond = |a: &&&Assembly| strength_of(&a.concrete).is_some_and(is_beyond);
+        let those: Vec<&&Assembly> = attacked.iter().filter(beyond).collect();
+        if let [first, ..] = those[..] {
+            unused.push(format!(
+                "The class of the concrete, {}, is not used for rust beyond {class}, because what is known of carbonation and chloride ends at a water/cement ratio of {water}: {}.",
+                first.concrete,
+                among(scene, first, those.len())
+            ));
+        }
+    }
+    unused
+}
+
+fn is_of_salt(class: &str) -> bool {
+    class.starts_with("XD") || class.starts_with("XS")
+}
+
+/// f_ck of a class such as C30/37, MPa.
+fn strength_of(concrete: &str) -> Option<f32> {
+    let (cylinder, _) = concrete.trim().strip_prefix('C')?.split_once('/')?;
+    cylinder.trim().parse().ok()
+}
+
+/// A member, and how many more.
+fn among(scene: &Scene, first: &Assembly, count: usize) -> String {
+    let name = scene.name_of(&first.id);
+    match count {
+        1 => name.to_owned(),
+        2 => format!("{name} and 1 more member"),
+        _ => format!("{name} and {} more members", count - 1),
+    }
 }
 
 pub(crate) fn limits(
@@ -46,6 +106,7 @@ pub(crate) fn limits(
         "Cracks that run through large voids or honeycomb, or are much narrower than a third of a pixel, are missed; a gap along a bar counts as a crack.".to_owned(),
         "Forecasts are made on coarse elements; widths of cracks by a forecast are those of EN 1992-1-1, 7.3.4, where bars run along the member.".to_owned(),
     ];
+    limits.extend(unused_conditions(scene));
     if scene.structure.bears_as_one() {
         limits.push("Members hand loads on as an elastic frame of whole sections does: what cracks and hands its load to others, and what falls, is not in the forecast.".to_owned());
     }

@@ -34,11 +34,30 @@ pub(crate) struct Model {
     pub(crate) bytes: Vec<u8>,
 }
 
-/// Refuses a model that has none of the scene's members, before anything is computed.
+/// Whether IfcOpenShell is there, asked by itself.
+const PRESENT: &str = r#"
+import json
+try:
+    import ifcopenshell
+except ImportError as error:
+    print(json.dumps({"fault": "absent", "message": str(error)}), flush=True)
+else:
+    print(json.dumps({"ready": True}), flush=True)
+"#;
+
+/// Refuses a model that has none of the scene's members or cannot be written to, before anything is
+/// computed.
 ///
 /// # Errors
-/// That, or it cannot be read.
-pub fn check_model(model: &Path, scene: &Scene) -> Result<(), ImportError> {
+/// That, it cannot be read, IfcOpenShell is not there, or the job was cancelled.
+pub fn check_model(model: &Path, scene: &Scene, job: &Job) -> Result<(), ImportError> {
+    has_members(model, scene)?;
+    let folder = tempfile::tempdir().map_err(|e| ImportError::write(&std::env::temp_dir(), &e))?;
+    ifcopenshell(model, PRESENT, folder.path(), &job.part(0.0, 0.0))
+}
+
+/// Refuses a model that has none of the scene's members.
+fn has_members(model: &Path, scene: &Scene) -> Result<(), ImportError> {
     let (file, _) = access::open(model).map_err(|why| ImportError::denied(model, &why))?;
     let ids: HashSet<&[u8]> = scene.members.iter().map(|m| m.id.as_bytes()).collect();
     for line in BufReader::new(file).split(b'\n') {

@@ -61,6 +61,11 @@ pub enum RecordError {
     /// The report cannot be printed.
     #[error(transparent)]
     Pdf(PdfError),
+    /// A file of the evidence is another one than when the scene was loaded.
+    #[error(
+        "{}: has changed or gone since the scene was read, so that nothing is known of which of the two the results are: give the command again", .0.display()
+    )]
+    Changed(PathBuf),
     /// Somebody asked to stop.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
@@ -119,6 +124,10 @@ impl Record {
             seed: (!pictures.is_empty()).then_some(self.seed),
             samples: (!pictures.is_empty()).then_some(self.samples),
         };
+        // Results stand for the hash of what was read.
+        if let Some(path) = scene.sources.first_changed(job)? {
+            return Err(RecordError::Changed(path.to_owned()));
+        }
         let model = match &self.ifc {
             Some(path) => {
                 job.relabel("putting the results into the IFC model");

@@ -18,6 +18,7 @@ use crate::{
     gltf,
     problem::{Problem, Severity},
     scene::Written,
+    sources::{SourceFile, SourceFiles, hash_of},
 };
 
 /// Largest file that is read into memory, bytes.
@@ -259,6 +260,7 @@ impl Scene {
         scene.name = name;
         scene.path = path.into();
         scene.hash = sources.hash();
+        scene.sources = SourceFiles::new(sources.hashed);
         Ok(scene)
     }
 
@@ -285,6 +287,7 @@ impl Scene {
         scene.name = (*name).into();
         scene.path = PathBuf::from(format!("scenes/{name}.ron"));
         scene.hash = sources.hash();
+        scene.sources = SourceFiles::new(sources.hashed);
         Ok(scene)
     }
 
@@ -389,6 +392,8 @@ pub(crate) struct Sources {
     pub(crate) folder: PathBuf,
     pub(crate) access: Access,
     hasher: blake3::Hasher,
+    /// Files that somebody else reads.
+    hashed: Vec<SourceFile>,
     /// Texels that its images may still have.
     pub(crate) texels: usize,
     /// A file, and what is to be taken for its text.
@@ -403,6 +408,7 @@ impl Sources {
             folder,
             access: access.clone(),
             hasher: blake3::Hasher::new(),
+            hashed: Vec::new(),
             texels: file::MAX_TEXELS,
             proposed: None,
         }
@@ -489,17 +495,10 @@ impl Sources {
         if length > MAX_FILE {
             return Err(failed(Denied::TooLong(MAX_FILE)));
         }
-        let mut file = file.take(MAX_FILE);
-        let mut hasher = blake3::Hasher::new();
-        let mut buffer = vec![0; 1 << 20];
-        loop {
-            job.step(0, 0)?;
-            match file.read(&mut buffer).map_err(|e| failed(e.into()))? {
-                0 => break,
-                n => hasher.update(buffer.get(..n).unwrap_or_default()),
-            };
-        }
-        self.hasher.update(hasher.finalize().as_bytes());
+        let facts = file.metadata().map_err(|e| failed(e.into()))?;
+        let hash = hash_of(file.take(MAX_FILE), job)?.map_err(|e| failed(e.into()))?;
+        self.hashed.push(SourceFile::new(path, &facts, hash));
+        self.hasher.update(hash.as_bytes());
         Ok(())
     }
 

@@ -4,7 +4,9 @@ use glam::{Mat4, Vec3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{Camera, Lamp, Material, Member, Mesh, Meter, Structure, Texture};
+use crate::{
+    Camera, Lamp, Material, Member, Mesh, Meter, Structure, Texture, sources::SourceFiles,
+};
 
 /// A scene in memory: everything resolved, checked and in SI units. Plain data; the plugin keeps it
 /// in [`CurrentScene`](crate::plugin::CurrentScene) and spreads it over entities.
@@ -42,6 +44,8 @@ pub struct Scene {
     pub warnings: Vec<String>,
     /// What stands in its file; nothing of what has no file of ours.
     pub written: Written,
+    /// The files that it names and that are read again later.
+    pub sources: SourceFiles,
 }
 
 /// The text of a scene's file: forms show and change it
@@ -123,17 +127,25 @@ impl Scene {
         named.map_or(id, |m| &m.name)
     }
 
-    /// The id of the member that somebody calls so: by its id, or by a name that no other has.
+    /// The id of the member that somebody calls so: by its id, or by a name that no other has; of a
+    /// name such as `Girder 1:Girder 1:166739`, which authoring tools make of family, type and
+    /// number, the first part will do.
     ///
     /// # Errors
     /// How many have that name: none or several.
     pub fn id_of(&self, word: &str) -> Result<&str, usize> {
-        let by_id = self.members.iter().find(|m| m.id == word);
-        if let Some(member) = by_id {
-            return Ok(&member.id);
+        let short = |name: &'_ str| name.split_once(':').map_or("", |(first, _)| first) == word;
+        let ways: [&dyn Fn(&Member) -> bool; 3] =
+            [&|m| m.id == word, &|m| m.name == word, &|m| !word.is_empty() && short(&m.name)];
+        for is_meant in ways {
+            let meant: Vec<&Member> = self.members.iter().filter(|m| is_meant(m)).collect();
+            match meant[..] {
+                [] => {}
+                [one] => return Ok(&one.id),
+                _ => return Err(meant.len()),
+            }
         }
-        let named: Vec<&Member> = self.members.iter().filter(|m| m.name == word).collect();
-        if let [one] = named[..] { Ok(&one.id) } else { Err(named.len()) }
+        Err(0)
     }
 
     /// Corners of the bounding box of all objects, m; zeros where there are none.

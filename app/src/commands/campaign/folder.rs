@@ -12,11 +12,14 @@
 
 use std::{
     collections::BTreeSet,
-    fs::{self, File, TryLockError},
+    fs, io,
     path::{Path, PathBuf},
 };
 
-use intrados_stage::access;
+use intrados_stage::{
+    access,
+    file::{FileLock, LockState},
+};
 use serde::{Deserialize, Serialize};
 
 use super::plan::{Plan, Unit};
@@ -68,7 +71,7 @@ pub(crate) enum State {
 /// A unit's folder while this process has it.
 pub(super) struct Held {
     pub(super) folder: PathBuf,
-    _lock: Option<File>,
+    _lock: FileLock,
 }
 
 impl Folder {
@@ -123,16 +126,14 @@ impl Folder {
 
     /// Takes a unit for this process; `None`: another one has it.
     pub(super) fn hold(&self, id: &str) -> Result<Option<Held>, Failure> {
-        let folder = self.0.join("work").join(id);
+        let folder = output::inner(&self.0, Path::new("work").join(id))?;
         output::folder(&folder)?;
-        let place = folder.join(LOCK);
-        let lock = File::create(&place).map_err(|e| Failure::cannot_write(&place, e))?;
-        match lock.try_lock() {
-            Err(TryLockError::WouldBlock) => Ok(None),
-            // Some network disks have no locks: then two may do the same, and the second rename
-            // finds that it is done.
-            Err(TryLockError::Error(_)) => Ok(Some(Held { folder, _lock: None })),
-            Ok(()) => Ok(Some(Held { folder, _lock: Some(lock) })),
+        // Some network disks have no locks: then two may do the same, and the second rename finds
+        // that it is done.
+        match FileLock::take(&folder.join(LOCK)) {
+            Ok(LockState::Held(lock)) => Ok(Some(Held { folder, _lock: lock })),
+            Ok(LockState::Elsewhere) => Ok(None),
+            Err(why) => Err(Failure::cannot_write(&folder, why)),
         }
     }
 
@@ -140,7 +141,7 @@ impl Folder {
     /// dropped and a different one kept beside it and refused.
     pub(super) fn publish(&self, held: &Held, record: &Record) -> Result<(), Failure> {
         let place = self.done(&record.id);
-        output::folder(&self.0.join("units"))?;
+        output::folder(&output::inner(&self.0, "units")?)?;
         output::put(&held.folder.join(RECORD), output::json(record)?.as_bytes())?;
         if let Err(why) = fs::rename(&held.folder, &place) {
             let Ok(there) = read_record(&place) else {
@@ -175,7 +176,8 @@ impl Folder {
         let failed =
             Failed { code: failure.code(), reason: crate::console::one_line(&failure.to_string()) };
         let place = self.failure(id);
-        let noted = output::folder(&self.0.join("failed"))
+        let noted = output::inner(&self.0, "failed")
+            .and_then(|folder| output::folder(&folder))
             .and_then(|()| output::json(&failed))
             .and_then(|text| output::put(&place, text.as_bytes()));
         if let Err(why) = noted {
@@ -204,12 +206,12 @@ impl Folder {
             return State::Done;
         }
         let work = self.0.join("work").join(&unit.id);
-        let lock = File::open(work.join(LOCK));
-        match lock.map(|lock| lock.try_lock()) {
-            Ok(Err(TryLockError::WouldBlock)) => State::Running,
+        match FileLock::take_existing(&work.join(LOCK)) {
+            Ok(LockState::Elsewhere) => State::Running,
             _ if self.failure(&unit.id).is_file() => State::Failed,
-            Ok(_) => State::BrokenOff,
-            Err(_) => State::Waiting,
+            Err(why) if why.kind() == io::ErrorKind::NotFound => State::Waiting,
+            // What is no lock is told by the one that wants to take it.
+            Ok(LockState::Held(_)) | Err(_) => State::BrokenOff,
         }
     }
 

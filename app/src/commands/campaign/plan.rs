@@ -5,16 +5,16 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use clap::Parser;
 use intrados_forecast::span;
 use intrados_stage::access;
 use serde::{Deserialize, Serialize};
 
 use super::network::Network;
 use crate::{
-    args::{self, Cli, Command},
+    args::{self, Command},
     commands::walks,
     failure::Failure,
+    options::{self, Unread},
     session::Session,
 };
 
@@ -327,10 +327,13 @@ fn check_words(plan: &Plan, args: &args::CampaignNew) -> Result<(), Failure> {
 
 /// The command of a unit.
 pub(crate) fn parse(words: &[String]) -> Result<Command, Failure> {
-    let parsed = Cli::try_parse_from(words).map_err(|e| {
-        let text = e.to_string();
-        let first = text.lines().next().unwrap_or_default();
-        Failure::Usage(first.trim_start_matches("error: ").to_owned())
+    let parsed = options::read(words.iter().map(Into::into)).map_err(|why| match why {
+        Unread::Words(e) => {
+            let text = e.to_string();
+            let first = text.lines().next().unwrap_or_default();
+            Failure::Usage(first.trim_start_matches("error: ").to_owned())
+        }
+        Unread::Unused(line) => Failure::Usage(line),
     })?;
     parsed.command.ok_or_else(|| Failure::Internal("a unit without a command".into()))
 }

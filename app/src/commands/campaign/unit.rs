@@ -103,7 +103,7 @@ fn work(
     if plan.walks() {
         return walk(session, folder, plan, unit, held);
     }
-    let files = held.folder.join(FILES);
+    let files = output::inner(&held.folder, FILES)?;
     let mut words = plan.words_of(unit)?;
     words.extend(["--out".to_owned(), text(&files)?]);
     if command(session, &words)? == Outcome::Interrupted {
@@ -138,8 +138,11 @@ pub(crate) fn learn(session: &Session, folder: &Folder, plan: &Plan) -> Result<(
         let Some(unit) = plan.units.iter().find(|unit| unit.structure == structure) else {
             continue;
         };
+        if !is_guided(&plan::parse(&plan.words_of(unit)?)?) {
+            continue;
+        }
         let guide = folder.guide(structure);
-        output::folder(guide.parent().unwrap_or(folder.path()))?;
+        output::folder(&output::inner(folder.path(), "guides")?)?;
         let mut words = plan.words_of(unit)?;
         let scratch = tempfile::tempdir()
             .map_err(|e| Failure::Internal(format!("a temporary folder: {e}")))?;
@@ -150,6 +153,16 @@ pub(crate) fn learn(session: &Session, folder: &Folder, plan: &Plan) -> Result<(
     Ok(())
 }
 
+/// Whether something may steer the walks of a command.
+fn is_guided(command: &args::Command) -> bool {
+    let light = match command {
+        args::Command::Measure(measure) => &measure.light,
+        args::Command::Render(render) => &render.light,
+        _ => return false,
+    };
+    light.guide != args::GuideArg::Off && light.estimator == args::EstimatorArg::NextEvent
+}
+
 /// Walks, whose checkpoint is their result.
 fn walk(
     session: &Session,
@@ -158,7 +171,7 @@ fn walk(
     unit: &Unit,
     held: &Held,
 ) -> Result<Option<String>, Failure> {
-    let (files, state) = (held.folder.join(FILES), held.folder.join(WALKS));
+    let (files, state) = (output::inner(&held.folder, FILES)?, held.folder.join(WALKS));
     let guide = folder.guide(unit.structure);
     let mut words = plan.words_of(unit)?;
     if guide.is_file() {

@@ -112,6 +112,9 @@ struct Done {
     strength: Option<Bears>,
 }
 
+/// Keeps a life of a model.
+type KeepLife<'a> = dyn Fn(&str, &[Forecast]) + Sync + 'a;
+
 /// What is known of a model's strength: [`Capacity`], none where nothing can be raised, or why
 /// nobody knows.
 type Borne = Result<Option<Capacity>, String>;
@@ -307,6 +310,16 @@ impl Predictor {
     /// # Errors
     /// A slice is missing or bad, or the job was cancelled. The piece is skipped by calling again.
     pub fn advance(&mut self, scene: &Scene, job: &Job) -> Result<bool, PredictError> {
+        self.advance_with(scene, job, &|_, _| {})
+    }
+
+    /// [`Self::advance`]; `keep` is told every life as soon as it is computed.
+    fn advance_with(
+        &mut self,
+        scene: &Scene,
+        job: &Job,
+        keep: &KeepLife<'_>,
+    ) -> Result<bool, PredictError> {
         let Some(item) = self.queue.get(self.next).cloned() else { return Ok(false) };
         if scene.hash != self.hash || scene.members.len() != self.readings.len() {
             return Err(PredictError::Changed);
@@ -325,7 +338,7 @@ impl Predictor {
         self.fates.resize(self.next, None);
         let done = match item {
             Item::Slice(slice) => self.look(scene, &slice, &job),
-            Item::Life(_) => self.foretell(scene, &lives, &job),
+            Item::Life(_) => self.foretell(scene, &lives, &job, keep),
             Item::Gauges(member) => self.feel(scene, member, &job),
             Item::Survey(member) => self.survey(scene, member, &job),
             Item::Photograph(photo, member) => self.behold(scene, photo, member, &job),
@@ -376,6 +389,7 @@ impl Predictor {
         scene: &Scene,
         models: &[String],
         job: &Job,
+        keep: &KeepLife<'_>,
     ) -> Result<(), PredictError> {
         let Some(settings) = self.settings.forecast else { return Ok(()) };
         let settings = ForecastSettings { work: settings.work.or(Some(self.share())), ..settings };
@@ -394,6 +408,7 @@ impl Predictor {
             let (handed, note) = part_of(frame, model);
             let mut told = forecast(scene, model, handed, rule, settings, &part(k))?;
             told.iter_mut().for_each(|one| one.notes.extend(note.clone()));
+            keep(model, &told);
             Ok(told)
         };
         let lives: Vec<_> = models.par_iter().enumerate().map(life).collect();
@@ -664,21 +679,25 @@ impl Predictor {
         of: &str,
         job: &Job,
     ) -> Result<bool, PredictError> {
-        let (piece, name, lives) =
-            (self.next, format!("{of}, piece {}", self.next), format!("{of}, lives"));
+        let (piece, name) = (self.next, format!("{of}, piece {}", self.next));
+        let name_of_life = |model: &str| format!("{of}, life of {model}");
         if piece == 0 {
-            self.lives.extend(
-                parts.recall::<BTreeMap<String, Vec<Forecast>>>(&lives).unwrap_or_default(),
-            );
+            for item in &self.queue {
+                let Item::Life(model) = item else { continue };
+                if let Some(known) = parts.recall(&name_of_life(model)) {
+                    self.lives.insert(model.clone(), known);
+                }
+            }
         }
         if let Some(more) = parts.recall(&name).and_then(|done| self.take_up(scene, done)) {
             return Ok(more);
         }
-        let known = self.lives.len();
-        let more = self.advance(scene, job);
-        if self.lives.len() > known {
-            parts.keep(&lives, Vec::new(), &self.lives);
-        }
+        // Of lives side by side one may take much longer than the others, which are kept at once.
+        let kept = &*parts;
+        let keep = |model: &str, told: &[Forecast]| {
+            kept.keep(&name_of_life(model), Vec::new(), &told);
+        };
+        let more = self.advance_with(scene, job, &keep);
         if let (Ok(_), Some(done)) = (&more, self.done(scene, piece)) {
             parts.keep(&name, Vec::new(), &done);
         }

@@ -6,7 +6,10 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use intrados_stage::Job;
+use intrados_stage::{
+    Job, access,
+    file::{self, remove_within, within},
+};
 use tempfile::TempDir;
 
 use super::{AttachError, Detached, Project, lock::Lock, text_of, write};
@@ -78,6 +81,7 @@ impl Change {
         let are_there = self.is_made == self.adds;
         for (number, copy) in self.copies.iter().enumerate() {
             let aside = self.kept.path().join(number.to_string());
+            let copy = &inside(copy, &self.folder)?;
             let (from, to) = if are_there { (copy, &aside) } else { (&aside, copy) };
             bring(from, to)?;
         }
@@ -121,25 +125,25 @@ fn kept(folder: &Path) -> Result<TempDir, AttachError> {
     tempfile::tempdir().map_err(|e| AttachError::write(folder, &e))
 }
 
+/// A copy's place, which is never outside of the project's folder.
+fn inside(copy: &Path, folder: &Path) -> Result<PathBuf, AttachError> {
+    let name = copy.strip_prefix(folder).unwrap_or(copy);
+    within(folder, name).map_err(|why| AttachError::CannotWrite(why.to_string()))
+}
+
 /// Copies a file, its folder with it.
 fn bring(from: &Path, to: &Path) -> Result<(), AttachError> {
     let failed = |e: io::Error| AttachError::write(to, &e);
     to.parent().map_or(Ok(()), fs::create_dir_all).map_err(failed)?;
-    fs::copy(from, to).map(drop).map_err(failed)
+    let (mut file, _) = access::open(from).map_err(|why| AttachError::denied(from, &why))?;
+    file::put(to, |out| io::copy(&mut file, out).map(drop)).map_err(failed)
 }
 
-/// Removes files, and the folders that are empty then, up to `top`.
+/// Removes copies, and the folders that are empty then, below `top`.
 pub(super) fn clear(files: &[PathBuf], top: &Path) -> Result<(), AttachError> {
-    for file in files {
-        fs::remove_file(file).map_err(|e| AttachError::write(file, &e))?;
-    }
-    for folder in files.first().and_then(|f| f.parent()).into_iter().flat_map(Path::ancestors) {
-        // Folders that hold something else stay.
-        if folder == top || fs::remove_dir(folder).is_err() {
-            break;
-        }
-    }
-    Ok(())
+    let name = |file: &PathBuf| file.strip_prefix(top).unwrap_or(file).to_owned();
+    let names: Vec<PathBuf> = files.iter().map(name).collect();
+    remove_within(top, &names).map_err(|e| AttachError::write(top, &e))
 }
 
 #[cfg(test)]

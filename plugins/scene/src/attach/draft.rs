@@ -2,9 +2,9 @@
 
 use std::{fs, io, path::Path, path::PathBuf, sync::Arc};
 
-use intrados_stage::{Access, Job};
+use intrados_stage::{Access, Job, file::AsideFolder};
 
-use super::{AttachError, Field, Setting, amend, fields, open_up, write};
+use super::{AttachError, Field, Setting, amend, fields, write};
 use crate::{
     LoadError, Scene,
     file::evidence,
@@ -66,21 +66,18 @@ impl Draft {
             let line = "name the folder that is to be made".to_owned();
             return Err(AttachError::BadInput(line));
         }
-        if folder.exists() {
+        if fs::symlink_metadata(folder).is_ok() {
             let why = "is there already: choose another folder";
             return Err(AttachError::CannotWrite(format!("{}: {why}", folder.display())));
         }
         let parent = folder.parent().filter(|p| !p.as_os_str().is_empty());
         let parent = parent.unwrap_or(Path::new("."));
         fs::create_dir_all(parent).map_err(failed)?;
-        let aside = tempfile::Builder::new().prefix(".new-").tempdir_in(parent).map_err(failed)?;
+        let aside = AsideFolder::begin(parent, ".new-").map_err(failed)?;
         let first = self.scene.members.first().map_or("", |m| m.id.as_str());
         write(&aside.path().join(PROJECT), &self.text)?;
         write(&aside.path().join(evidence::NAME), &evidence::skeleton(PROJECT, first))?;
-        open_up(aside.path()).map_err(failed)?;
-        fs::rename(aside.path(), folder).map_err(failed)?;
-        // It is where it belongs.
-        let _ = aside.keep();
+        aside.settle(folder).map_err(failed)?;
         Ok(folder.join(PROJECT))
     }
 }

@@ -26,11 +26,10 @@ use std::{
 use intrados_stage::{
     Access, Job,
     access::{self, Denied},
-    file,
+    file::{self, AsideFolder, within},
 };
 use ron::{extensions::Extensions, ser::PrettyConfig};
 use serde::Serialize;
-use tempfile::TempDir;
 
 pub use crate::file::evidence::{Along, Face, Finding, Kind};
 pub use amend::Setting;
@@ -437,7 +436,12 @@ impl Project {
 
     /// What the loading of a proposal says, in the words of who proposed it: places in the file
     /// that is not written, and in copies that will not stay, mean nothing to him.
-    fn told_of(&self, error: LoadError, aside: Option<&TempDir>, what: &Attachment) -> AttachError {
+    fn told_of(
+        &self,
+        error: LoadError,
+        aside: Option<&AsideFolder>,
+        what: &Attachment,
+    ) -> AttachError {
         let own = format!("{}: ", self.evidence().display());
         let given = As::given(&self.folder, aside, what);
         let plain = |mut p: crate::Problem| {
@@ -602,7 +606,7 @@ impl Project {
         what: &Attachment,
         place: &str,
         job: &Job,
-    ) -> Result<Option<TempDir>, AttachError> {
+    ) -> Result<Option<AsideFolder>, AttachError> {
         let files = what.files();
         if files.is_empty() {
             return Ok(None);
@@ -629,14 +633,13 @@ impl Project {
                 return Err(AttachError::BadInput(format!("{}: {why}", file.display())));
             }
         }
-        let place = self.folder.join(place);
-        if place.exists() {
+        let place = self.inside(place)?;
+        if fs::symlink_metadata(&place).is_ok() {
             let why = "is there already: choose another --name, or move it away";
             return Err(AttachError::CannotWrite(format!("{}: {why}", place.display())));
         }
         let failed = |e: io::Error| AttachError::write(&self.folder, &e);
-        let here = if self.folder.as_os_str().is_empty() { Path::new(".") } else { &self.folder };
-        let aside = tempfile::Builder::new().prefix(".attach-").tempdir_in(here).map_err(failed)?;
+        let aside = AsideFolder::begin(&self.folder, ".attach-").map_err(failed)?;
         for (i, file) in files.iter().enumerate() {
             job.step(i, files.len()).map_err(LoadError::from)?;
             let (mut from, _) = access::open(file).map_err(|w| AttachError::denied(file, &w))?;
@@ -804,7 +807,13 @@ impl Project {
         format!("{place}: \"{short}\" is not attached to \"{member}\": {hint}")
     }
 
+    /// Where copies lie, which is never outside of the project's folder.
+    fn inside(&self, place: impl AsRef<Path>) -> Result<PathBuf, AttachError> {
+        within(&self.folder, place).map_err(|why| AttachError::CannotWrite(why.to_string()))
+    }
+
     /// Copies of files that nothing else names: those in a folder of their own below `evidence/`.
+    /// What links lead to outside of the project are none.
     fn copies(&self, files: &[String], left: &EvidenceFile) -> Vec<PathBuf> {
         let named = |text: &str| {
             let tables = left.tables.iter().map(|t| &t.file);
@@ -816,7 +825,10 @@ impl Project {
         let mut copies = Vec::new();
         for text in files {
             let Some((folder, pattern)) = copy_of(text).filter(|_| !named(text)) else { continue };
-            let folder = self.folder.join(COPIES).join(folder);
+            let Ok(place) = self.inside(Path::new(COPIES).join(folder).join(pattern)) else {
+                continue;
+            };
+            let folder = place.parent().unwrap_or(&self.folder).to_owned();
             let stem = Path::new(pattern).file_stem().unwrap_or_default().to_string_lossy();
             let mask = format!("{stem}_mask-*");
             let is_copy = |name: &String| matches(pattern, name) || matches(&mask, name);
@@ -836,8 +848,8 @@ struct As {
 }
 
 impl As {
-    fn given(folder: &Path, aside: Option<&TempDir>, what: &Attachment) -> Self {
-        let name = |dir: &TempDir| dir.path().file_name().unwrap_or_default().to_os_string();
+    fn given(folder: &Path, aside: Option<&AsideFolder>, what: &Attachment) -> Self {
+        let name = |dir: &AsideFolder| dir.path().file_name().unwrap_or_default().to_os_string();
         let given = what.files().first().and_then(|f| f.parent());
         Self {
             copies: aside.map(|dir| format!("{}/", folder.join(name(dir)).display())),
@@ -950,6 +962,10 @@ fn patterns(files: &[PathBuf], at: &str) -> Result<Vec<String>, AttachError> {
 }
 
 fn write(path: &Path, text: &str) -> Result<(), AttachError> {
+    if fs::symlink_metadata(path).is_ok_and(|facts| facts.is_symlink()) {
+        let why = "is a link, and writing would put a file in its place: put the file itself there";
+        return Err(AttachError::CannotWrite(format!("{}: {why}", path.display())));
+    }
     file::put(path, |out| io::Write::write_all(out, text.as_bytes()))
         .map_err(|e| AttachError::write(path, &e))
 }
@@ -967,7 +983,7 @@ pub struct Proposal<'a> {
     /// What the user should know of it.
     pub notes: Vec<String>,
     text: String,
-    aside: Option<TempDir>,
+    aside: Option<AsideFolder>,
     /// Where the copies go, relative to the scene.
     place: String,
 }
@@ -981,14 +997,11 @@ impl Proposal<'_> {
         let project = self.project;
         project.unchanged()?;
         let mut copies = Vec::new();
-        let place = project.folder.join(&self.place);
+        let place = project.inside(&self.place)?;
         if let Some(aside) = self.aside {
             let failed = |e: io::Error| AttachError::write(&place, &e);
             fs::create_dir_all(project.folder.join(COPIES)).map_err(failed)?;
-            open_up(aside.path()).map_err(failed)?;
-            fs::rename(aside.path(), &place).map_err(failed)?;
-            // It is where it belongs.
-            let _ = aside.keep();
+            aside.settle(&place).map_err(failed)?;
             let names = listing(&place).map_err(AttachError::Load)?;
             copies = names.into_iter().map(|name| place.join(name)).collect();
         }
@@ -999,18 +1012,6 @@ impl Proposal<'_> {
         }
         written.map(|()| copies)
     }
-}
-
-/// A temporary folder is its owner's alone; evidence is as any other.
-#[cfg(unix)]
-fn open_up(folder: &Path) -> io::Result<()> {
-    use std::os::unix::fs::PermissionsExt;
-    fs::set_permissions(folder, fs::Permissions::from_mode(0o755))
-}
-
-#[cfg(not(unix))]
-fn open_up(_: &Path) -> io::Result<()> {
-    Ok(())
 }
 
 /// What was taken away.

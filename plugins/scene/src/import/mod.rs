@@ -197,6 +197,7 @@ pub fn import(
     job: &Job,
 ) -> Result<Imported, ImportError> {
     vacant(folder)?;
+    writable(folder)?;
     let extension =
         path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
     let metres = told.metres.unwrap_or(1.0);
@@ -240,8 +241,21 @@ fn unknown_names(
     Err(ImportError::bad(path, what))
 }
 
-/// Refuses a folder that holds something.
+/// Refuses a place where no folder can be made, before a model is read for minutes.
+fn writable(folder: &Path) -> Result<(), ImportError> {
+    let above = folder.ancestors().skip(1).find(|above| above.is_dir());
+    let above = above.filter(|above| !above.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    tempfile::tempfile_in(above).map(drop).map_err(|e| ImportError::write(folder, &e))
+}
+
+/// Refuses a folder that holds something, and a link in its place.
 fn vacant(folder: &Path) -> Result<(), ImportError> {
+    if fs::symlink_metadata(folder).is_ok_and(|facts| facts.is_symlink()) {
+        return Err(ImportError::CannotWrite(format!(
+            "{}: is a link: name the folder itself (--out)",
+            folder.display()
+        )));
+    }
     let taken = match fs::read_dir(folder) {
         Ok(mut entries) => entries.next().is_some(),
         Err(e) if e.kind() == io::ErrorKind::NotFound => false,

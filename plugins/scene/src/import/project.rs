@@ -9,7 +9,10 @@ use std::{
 };
 
 use glam::Vec3;
-use intrados_stage::{Job, file};
+use intrados_stage::{
+    Job,
+    file::{self, AsideFolder},
+};
 
 use super::{
     ImportError, Imported, Told,
@@ -52,7 +55,7 @@ pub(super) fn write(
     if !parent.is_dir() {
         fs::create_dir_all(parent).map_err(failed)?;
     }
-    let aside = tempfile::Builder::new().prefix(".import-").tempdir_in(parent).map_err(failed)?;
+    let aside = AsideFolder::begin(parent, ".import-").map_err(failed)?;
     let place = aside.path();
     gltf::write_glb(&place.join(MODEL), &built.model).map_err(failed)?;
     let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
@@ -70,11 +73,7 @@ pub(super) fn write(
     if folder.is_dir() {
         fs::remove_dir(folder).map_err(failed)?;
     }
-    // A temporary folder is its owner's alone; a project is as any other.
-    open_up(place).map_err(failed)?;
-    fs::rename(place, folder).map_err(failed)?;
-    // It is where it belongs.
-    let _ = aside.keep();
+    aside.settle(folder).map_err(failed)?;
     Ok(imported)
 }
 
@@ -91,17 +90,6 @@ fn unfit(path: &Path, aside: &Path, error: crate::LoadError) -> ImportError {
             error.to_string().replace(&aside, "")
         ),
     )
-}
-
-#[cfg(unix)]
-fn open_up(folder: &Path) -> std::io::Result<()> {
-    use std::os::unix::fs::PermissionsExt;
-    fs::set_permissions(folder, fs::Permissions::from_mode(0o755))
-}
-
-#[cfg(not(unix))]
-fn open_up(_: &Path) -> std::io::Result<()> {
-    Ok(())
 }
 
 /// A member with what is said of it in the scene.

@@ -1,6 +1,9 @@
 //! Files that are there whole or not at all: each is written beside its place and moved there once
 //! it is complete; and [`Set`]s of files of which the same is true.
 
+mod aside;
+mod inside;
+mod lock;
 mod names;
 mod set;
 
@@ -21,6 +24,9 @@ pub struct WriteError {
     pub source: io::Error,
 }
 
+pub use aside::AsideFolder;
+pub use inside::{remove_within, within};
+pub use lock::{FileLock, LockState};
 use names::hash;
 pub use names::{file_name, file_names};
 pub use set::Set;
@@ -44,6 +50,8 @@ impl Unfinished {
         }
         let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
         let file = tempfile::Builder::new().prefix(".intrados-").tempfile_in(folder)?;
+        // Who finds one without its lock knows that its process was killed; some disks have none.
+        let _ = file.as_file().try_lock();
         Ok(Self { file: BufWriter::with_capacity(1 << 20, file), path: path.to_owned() })
     }
 

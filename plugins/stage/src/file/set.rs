@@ -1,14 +1,16 @@
 //! Files that belong together, and the finished parts of the work that makes them.
 
 use std::{
-    fs::{self, File, TryLockError},
+    fs,
     io::{self, Write},
     path::{Component, Path, PathBuf},
+    time::{Duration, Instant},
 };
 
 use serde::{Serialize, de::DeserializeOwned};
 
-use super::{hash, put};
+use super::{FileLock, LockState, hash, put, within};
+use crate::access;
 
 /// Files that belong together, on their way into a folder; one of them is the *list*, which names
 /// the others.
@@ -26,7 +28,7 @@ pub struct Set {
     folder: PathBuf,
     aside: PathBuf,
     /// Held while somebody works aside.
-    lock: Option<File>,
+    lock: Option<FileLock>,
     /// Folders that were made for it, the outermost first.
     made: Vec<PathBuf>,
     names: Vec<String>,
@@ -44,6 +46,14 @@ struct Part<T> {
 const NAMELESS: &str = ".intrados-set-";
 const LOCK: &str = ".lock";
 const PARTS: &str = ".parts";
+/// Beginning of the names of all hidden folders.
+const HIDDEN: &str = ".intrados-";
+/// Publishing is a few renames: a run that takes longer has stopped.
+const PATIENCE: Duration = Duration::from_secs(60);
+/// Between two looks at whether another run has published.
+const PAUSE: Duration = Duration::from_millis(10);
+/// Longest record of a finished part, bytes.
+const LONGEST: u64 = 4 << 30;
 
 impl Set {
     /// Begins a set in `folder`, which need not be there yet.
@@ -68,28 +78,36 @@ impl Set {
     /// published. The key says all that its files depend on.
     ///
     /// # Errors
-    /// Nothing can be written there, or another run of the same key is at work.
+    /// Nothing can be written there, or another run whose parts are kept there is at work.
     pub fn resume(folder: &Path, key: &str) -> io::Result<Self> {
         let made = make(folder)?;
         sweep(folder);
-        let aside = folder.join(format!(".intrados-{:016x}", hash(key)));
-        fs::create_dir_all(aside.join(PARTS))?;
+        let name = format!("{HIDDEN}{:016x}", hash(key));
+        if is_taken(folder, &name) {
+            let why = "another run is at work there: wait for it, or name another folder";
+            return Err(io::Error::new(io::ErrorKind::ResourceBusy, why));
+        }
+        let aside = folder.join(&name);
+        // A link would have the parts written elsewhere.
+        if fs::symlink_metadata(&aside).is_ok_and(|facts| !facts.is_dir()) {
+            fs::remove_file(&aside)?;
+        }
+        fs::create_dir_all(within(folder, Path::new(&name).join(PARTS))?)?;
+        within(&aside, Path::new(PARTS).join("any"))?;
         Self::lock(folder, aside, made)
     }
 
     fn lock(folder: &Path, aside: PathBuf, made: Vec<PathBuf>) -> io::Result<Self> {
-        let lock = File::create(aside.join(LOCK))?;
-        match lock.try_lock() {
-            Err(TryLockError::WouldBlock) => {
-                return Err(io::Error::new(
-                    io::ErrorKind::ResourceBusy,
-                    "another run is writing the same there",
-                ));
+        match FileLock::take(&aside.join(LOCK))? {
+            LockState::Held(lock) => {
+                let folder = folder.to_owned();
+                Ok(Self { folder, aside, lock: Some(lock), made, names: Vec::new() })
             }
-            // Some network disks have no locks.
-            Err(TryLockError::Error(_)) | Ok(()) => {}
+            LockState::Elsewhere => {
+                let why = "another run is writing the same there";
+                Err(io::Error::new(io::ErrorKind::ResourceBusy, why))
+            }
         }
-        Ok(Self { folder: folder.to_owned(), aside, lock: Some(lock), made, names: Vec::new() })
     }
 
     /// Where its files will be.
@@ -165,14 +183,18 @@ impl Set {
 
     /// The value of a part that is finished, and its files.
     pub fn recall<T: DeserializeOwned>(&mut self, name: &str) -> Option<T> {
-        let text = fs::read_to_string(self.record(name)).ok()?;
+        let bytes = access::read(&self.record(name), LONGEST).ok()?;
+        let text = std::str::from_utf8(&bytes).ok()?;
         // What is damaged is done again: its value need not be one that the work could have made.
         let (sum, text) = text.split_once('\n')?;
         if sum != format!("{:016x}", hash(text)) {
             return None;
         }
         let part = ron::from_str::<Part<T>>(text).ok()?;
-        let is_own = |file: &String| is_plain(file) && self.aside.join(file).is_file();
+        let is_own = |file: &String| {
+            let place = within(&self.aside, file);
+            is_plain(file) && place.is_ok_and(|place| is_regular(&place))
+        };
         if part.name != name || !part.files.iter().all(is_own) {
             return None;
         }
@@ -193,11 +215,24 @@ impl Set {
         self.aside.join(PARTS).join(format!("{:016x}.ron", hash(name)))
     }
 
-    /// Gives the files their places; `list` is the one that names the others.
+    /// Gives the files their places; `list` is the one that names the others. Runs that publish
+    /// into one folder do so one after the other, each whole.
     ///
     /// # Errors
-    /// A place is taken by a folder, or cannot be written.
+    /// A place is taken by a folder, leads out of the folder by a link, or cannot be written.
     pub fn publish(mut self, list: &str) -> io::Result<Vec<PathBuf>> {
+        for name in &self.names {
+            within(&self.folder, name)?;
+        }
+        let since = Instant::now();
+        let lock = FileLock::wait_for_folder(&self.folder, || {
+            if since.elapsed() > PATIENCE {
+                let why = "another run has been writing there for a minute: end it, or name another folder";
+                return Err(io::Error::new(io::ErrorKind::ResourceBusy, why));
+            }
+            std::thread::sleep(PAUSE);
+            Ok(())
+        })?;
         if let Some(taken) = self.files().into_iter().find(|path| path.is_dir()) {
             return Err(io::Error::new(
                 io::ErrorKind::IsADirectory,
@@ -209,6 +244,7 @@ impl Set {
         }
         let files = self.files();
         self.forget();
+        drop(lock);
         Ok(files)
     }
 
@@ -258,9 +294,41 @@ fn make(folder: &Path) -> io::Result<Vec<PathBuf>> {
     Ok(made)
 }
 
-/// Removes what runs without a key left that were killed.
+/// A file, and no link to one.
+fn is_regular(place: &Path) -> bool {
+    fs::symlink_metadata(place).is_ok_and(|facts| facts.is_file())
+}
+
+/// Whether another run keeps its parts in the folder now, under another name than this.
+fn is_taken(folder: &Path, name: &str) -> bool {
+    let Ok(entries) = fs::read_dir(folder) else { return false };
+    let others = entries.flatten().filter(|entry| {
+        let theirs = entry.file_name();
+        let theirs = theirs.to_string_lossy();
+        theirs.starts_with(HIDDEN) && !theirs.starts_with(NAMELESS) && theirs != name
+    });
+    let mut locks = others.map(|entry| entry.path().join(LOCK));
+    locks.any(|lock| matches!(FileLock::take_existing(&lock), Ok(LockState::Elsewhere)))
+}
+
+/// Removes a file that was being written when its process was killed. What is younger than a minute
+/// may not have its lock yet.
+fn sweep_file(entry: &fs::DirEntry) {
+    let is_old = || entry.metadata().ok()?.modified().ok()?.elapsed().ok();
+    let is_ours = entry.file_name().to_string_lossy().starts_with(HIDDEN)
+        && entry.file_type().is_ok_and(|kind| kind.is_file());
+    if is_ours
+        && is_old().is_some_and(|age| age > PATIENCE)
+        && matches!(FileLock::take_existing(&entry.path()), Ok(LockState::Held(_)))
+    {
+        let _ = fs::remove_file(entry.path());
+    }
+}
+
+/// Removes what runs without a key left that were killed, and files that never came to their place.
 fn sweep(folder: &Path) {
     let Ok(entries) = fs::read_dir(folder) else { return };
+    let entries = entries.inspect(|entry| entry.as_ref().map_or((), sweep_file));
     for entry in
         entries.flatten().filter(|entry| entry.file_name().to_string_lossy().starts_with(NAMELESS))
     {
@@ -268,8 +336,8 @@ fn sweep(folder: &Path) {
         let _ = fs::remove_dir(entry.path());
         // Whoever begins makes the lock before all else: what has files and no lock was killed while
         // it was being removed.
-        let is_dead = match File::open(entry.path().join(LOCK)) {
-            Ok(lock) => lock.try_lock().is_ok(),
+        let is_dead = match FileLock::take_existing(&entry.path().join(LOCK)) {
+            Ok(state) => matches!(state, LockState::Held(_)),
             Err(why) => why.kind() == io::ErrorKind::NotFound,
         };
         if is_dead {
