@@ -323,6 +323,7 @@ fn source(answer: Answer, shapes: &[u8]) -> Result<Source, String> {
     }
     georeference.elevation = georeference.elevation.map(|e| e * scale);
     Ok(Source {
+        moved: DVec3::ZERO,
         format: format!("{} in {unit}, by IfcOpenShell {}", answer.schema, answer.ifcopenshell),
         project: answer.project,
         year: answer.year,

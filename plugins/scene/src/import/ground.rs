@@ -41,7 +41,7 @@ pub(super) fn on_ground(members: &[Standing]) -> Vec<bool> {
 }
 
 /// Whether `other` begins below the foot of `m` and reaches up to it.
-fn reaches(other: &Standing, m: &Standing) -> bool {
+pub(super) fn reaches(other: &Standing, m: &Standing) -> bool {
     let foot = m.bounds[0].y;
     let overlap = |i: usize| {
         other.bounds[0][i] < m.bounds[1][i] + SLACK && other.bounds[1][i] > m.bounds[0][i] - SLACK

@@ -14,6 +14,7 @@ mod build;
 mod close;
 mod convert;
 mod course;
+mod doubt;
 mod grade;
 mod ground;
 mod kind;
@@ -42,12 +43,24 @@ use crate::{LoadError, MemberKind, Scene, problem::unwritten};
 pub struct Told {
     /// Metres per unit of the file, where its format says none (glTF says metres).
     pub metres: Option<f64>,
+    /// Which axis of the file points up, where its format says none (glTF says y).
+    pub up: Option<UpAxis>,
     /// When it was built.
     pub year: Option<i32>,
     /// Classes of EN 206 that attack all of it.
     pub exposure: Option<String>,
     /// What people, goods and traffic weigh on its slabs, kN/m².
     pub imposed_kpa: Option<f32>,
+}
+
+/// Which axis of a file points up.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum UpAxis {
+    /// As in glTF and in this program.
+    #[default]
+    Y,
+    /// As in most programs for structures; x, y and z become x, z and −y.
+    Z,
 }
 
 /// What came of an import.
@@ -177,15 +190,17 @@ pub fn import(
     vacant(folder)?;
     let extension =
         path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
-    let metres = told.metres.unwrap_or(1.0);
+    if extension == "ifc" && told.up.is_some() {
+        return Err(ImportError::bad(path, "IFC says which way is up: leave --up out"));
+    }
     if extension == "ifc" && told.metres.is_some() {
         let what = "IFC says in which unit it is: leave --unit out, and export the model again where its unit is wrong or missing";
         return Err(ImportError::bad(path, what));
     }
     let (source, model) = match extension.as_str() {
         "ifc" => (convert::ifc(path, &job.part(0.0, 0.8))?, crate::gltf::Model::default()),
-        "glb" | "gltf" => model::gltf(path, told.metres, access, job)?,
-        "obj" => model::obj(path, metres)?,
+        "glb" | "gltf" => model::gltf(path, told, access, job)?,
+        "obj" => model::obj(path, told)?,
         _ => {
             // A missing file is missing whatever its name is.
             intrados_stage::access::open(path).map_err(|e| ImportError::denied(path, &e))?;
@@ -198,6 +213,9 @@ pub fn import(
     job.relabel(format!("looking at {}", path.display()));
     let mut built = build::build(&source, model, &job.part(0.8, 0.95))?;
     measure(path, &mut built, told, extension == "ifc")?;
+    if extension != "ifc" {
+        built.notes.extend(doubt::doubts(&source, &built, told));
+    }
     project::write(path, folder, &source, &built, told, &job.part(0.95, 1.0))
 }
 
@@ -258,4 +276,38 @@ fn measure(
         path,
         format!("the model is {size:.4} m across: mm or m? say it, with --unit mm or --unit m"),
     ))
+}
+
+#[cfg(test)]
+mod scratch {
+    #[test]
+    fn scratch_print_all() {
+        let Some(folder) = std::env::var_os("SCRATCH") else { return };
+        let mut files: Vec<_> =
+            std::fs::read_dir(folder).unwrap().map(|f| f.unwrap().path()).collect();
+        files.sort();
+        for path in files {
+            let out = tempfile::tempdir().unwrap();
+            let told = super::Told::default();
+            let found = super::import(
+                &path,
+                &out.path().join("o"),
+                &told,
+                &Default::default(),
+                &Default::default(),
+            );
+            println!("=== {}", path.file_name().unwrap().to_string_lossy());
+            match found {
+                Err(e) => println!("   REFUSED {e}"),
+                Ok(found) => {
+                    let text = std::fs::read_to_string(out.path().join("o/scene.ron")).unwrap();
+                    for l in text.lines().filter(|l| l.contains("m across")) {
+                        println!("   {}", l.trim());
+                    }
+                    println!("   offset {:?}", found.offset_m);
+                    found.notes.iter().for_each(|n| println!("   - {n}"));
+                }
+            }
+        }
+    }
 }
