@@ -315,6 +315,9 @@ pub(crate) struct Import {
     /// Unit of an OBJ file, or of a glTF file that is not in metres as it should be
     #[arg(long, value_name = "UNIT", value_parser = ["mm", "cm", "m", "in", "ft"])]
     pub(crate) unit: Option<String>,
+    /// Which axis of an OBJ file points up, or of a glTF file whose y axis does not
+    #[arg(long, value_name = "AXIS", value_parser = ["y", "z"])]
+    pub(crate) up: Option<String>,
     /// When it was built: concrete of which nothing is said is assumed by that, and age
     #[arg(long, value_name = "YEAR", value_parser = value_parser!(i32).range(1850..=2100))]
     pub(crate) year: Option<i32>,

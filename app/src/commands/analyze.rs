@@ -426,7 +426,7 @@ fn asked_for<'a>(
 /// The whole of a scene: `asked` for, or where its members bear as one. There a whole that cannot
 /// be computed leaves every member to its own supports.
 fn whole_of(session: &Session, scene: &Scene, asked: bool) -> Result<Option<Whole>, Failure> {
-    if !asked && !scene.structure.bears_as_one() {
+    if !asked && !scene.bears_as_one() {
         return Ok(None);
     }
     match whole::computed(session, scene, false) {

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use intrados_scene::{
     MemberKind,
-    import::{self, Imported, Told},
+    import::{self, Imported, Told, UpAxis},
 };
 use serde::Serialize;
 
@@ -34,6 +34,7 @@ pub(crate) fn run(session: &Session, args: &args::Import) -> Result<Outcome, Fai
         .unwrap_or_else(|| PathBuf::from(args.model.file_stem().unwrap_or("imported".as_ref())));
     let told = Told {
         metres: args.unit.as_deref().map(metres),
+        up: args.up.as_deref().map(|up| if up == "z" { UpAxis::Z } else { UpAxis::Y }),
         year: args.year,
         exposure: args.exposure.clone(),
         imposed_kpa: args.imposed,

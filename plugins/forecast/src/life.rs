@@ -269,7 +269,8 @@ impl From<Cancelled> for ForecastError {
 #[must_use]
 pub fn models(scene: &Scene) -> Vec<String> {
     let structure = &scene.structure;
-    let is_held = |id: &str| structure.is_held(id) || structure.bears_as_one();
+    let as_one = scene.bears_as_one();
+    let is_held = |id: &str| structure.is_held(id) || as_one;
     structure
         .assemblies
         .iter()

@@ -76,7 +76,7 @@ pub fn refusal(scene: &Scene, reading: &Reading) -> Option<String> {
                 .into(),
         );
     }
-    if matches!(gauge.measures, Measures::Displacement(_)) && structure.bears_as_one() {
+    if matches!(gauge.measures, Measures::Displacement(_)) && scene.bears_as_one() {
         return Some(
             "what moves it is the whole structure, and its own model knows its strains alone: give strains".into(),
         );

@@ -10,8 +10,11 @@ use intrados_mechanics::{
     member::{Meshing, Prepared, prepare_within},
     model::Action,
 };
-use intrados_scene::{MemberKind, Mesh, Scene};
-use intrados_stage::Job;
+use intrados_scene::{
+    MemberKind, Mesh, Scene,
+    import::{Told, import},
+};
+use intrados_stage::{Access, Job};
 use modelled::alone;
 
 /// A scene of this text.
@@ -289,4 +292,50 @@ fn a_ragged_body_weighs_what_its_volume_does() {
     let found = whole(&scene, false, &Job::default()).unwrap();
     let weight = PIER * 2400.0 * 9.81;
     assert!(near(up(&found, "P"), weight, 1e-5), "{} of {weight}", up(&found, "P"));
+}
+
+/// A box as an OBJ file, from the origin: beams and slabs as other programs write them.
+fn block(name: &str, [a, b, c]: [f64; 3]) -> String {
+    let mut text = format!("o {name}\n");
+    for z in [0.0, c] {
+        for [x, y] in [[0.0, 0.0], [a, 0.0], [a, b], [0.0, b]] {
+            text += &format!("v {x} {y} {z}\n");
+        }
+    }
+    text + "f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n"
+}
+
+/// What import assumes of a lone beam is two bearings: of W = 2400 kg/m³ g l b h each has half, upward,
+/// and none clamps it: no moment about the line across. By hand for a girder, a shallow beam and a
+/// slab, along x and along z.
+#[test]
+fn what_import_assumes_of_a_lone_beam_are_bearings() {
+    for (name, size) in [
+        ("Beam_1", [28.0, 1.2, 0.6]),
+        ("Beam_2", [6.0, 0.5, 0.3]),
+        ("Beam_3", [0.3, 0.5, 9.0]),
+        ("Slab_1", [7.0, 0.25, 4.0]),
+    ] {
+        let place = tempfile::tempdir().unwrap();
+        let (file, folder) = (place.path().join("beam.obj"), place.path().join("out"));
+        std::fs::write(&file, block(name, size)).unwrap();
+        let job = Job::default();
+        import(&file, &folder, &Told::default(), &Access::default(), &job).unwrap();
+        let scene = Scene::load(&folder.join("scene.ron"), &job).unwrap();
+        let found = whole(&scene, false, &job).unwrap();
+        let weight = found.reactions.iter().map(|r| r.force_n[1]).sum::<f64>();
+        let by_hand = 9.81 * 2400.0 * size.iter().product::<f64>();
+        assert!((weight / by_hand - 1.0).abs() < 0.01, "{name}: {weight} N for {by_hand}");
+        let along = if size[0] > size[2] { 0 } else { 2 };
+        let middle = 0.5 * size[along];
+        for half in [false, true] {
+            let there = found.reactions.iter().filter(|r| (r.at_m[along] > middle) == half);
+            let [force, moment] = there.fold([0.0; 2], |[f, m], r| {
+                assert!(r.force_n[1] > 0.0, "{name}: {r:?}");
+                [f + r.force_n[1], m + r.moment_nm[2 - along].abs()]
+            });
+            assert!((force / by_hand - 0.5).abs() < 0.01, "{name}: {force} N");
+            assert!(moment < 1e-3 * by_hand * size[along], "{name}: {moment} N m");
+        }
+    }
 }

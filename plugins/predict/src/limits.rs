@@ -107,7 +107,7 @@ pub(crate) fn limits(
         "Forecasts are made on coarse elements; widths of cracks by a forecast are those of EN 1992-1-1, 7.3.4, where bars run along the member.".to_owned(),
     ];
     limits.extend(unused_conditions(scene));
-    if scene.structure.bears_as_one() {
+    if scene.bears_as_one() {
         limits.push("Members hand loads on as an elastic frame of whole sections does: what cracks and hands its load to others, and what falls, is not in the forecast.".to_owned());
     }
     if members.iter().any(|m| m.capacity.is_some()) {

@@ -14,6 +14,7 @@ pub mod member;
 pub mod mesh;
 pub mod parametric;
 pub mod plugin;
+mod polygon;
 pub mod problem;
 mod scene;
 pub mod sensor;

@@ -1,11 +1,12 @@
-use std::{path::PathBuf, sync::Arc};
+use std::{collections::HashMap, path::PathBuf, sync::Arc};
 
 use glam::{Mat4, Vec3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    Camera, Lamp, Material, Member, Mesh, Meter, Structure, Texture, sources::SourceFiles,
+    Assembly, Camera, Lamp, Material, Member, MemberKind, Mesh, Meter, Structure, Texture,
+    sources::SourceFiles,
 };
 
 /// A scene in memory: everything resolved, checked and in SI units. Plain data; the plugin keeps it
@@ -118,6 +119,34 @@ impl Scene {
     /// there.
     pub fn assemble(&mut self) {
         Arc::make_mut(&mut self.structure).assemble(&self.members, &self.objects);
+    }
+
+    /// Whether its members bear as one, those that touch and of which no joint is said
+    /// monolithically: the scene says how members are joined, or of a support that it is only there
+    /// for members by themselves, or one that nothing holds touches others, which must carry it.
+    /// Else each is computed as its own supports hold it. `predict`, `analyze` and the window ask
+    /// this alone; `analyze --whole` is told to compute the whole.
+    #[must_use]
+    pub fn bears_as_one(&self) -> bool {
+        /// How far apart members may be that touch, m.
+        const SLACK: f32 = 0.05;
+        let structure = &self.structure;
+        if structure.is_joined() {
+            return true;
+        }
+        let bounds: HashMap<&str, [Vec3; 2]> =
+            self.members.iter().map(|m| (m.id.as_str(), m.bounds)).collect();
+        let of = |a: &Assembly| bounds.get(a.id.as_str()).copied();
+        let is_held = |a: &&Assembly| a.kind == MemberKind::Footing || structure.is_held(&a.id);
+        let solid = structure.assemblies.iter().filter(|a| !a.is_tunnel());
+        let (held, free): (Vec<&Assembly>, Vec<&Assembly>) = solid.partition(is_held);
+        let touches = |a: &Assembly, b: &Assembly| match (of(a), of(b)) {
+            (Some([l, h]), Some([m, n])) => {
+                (l - SLACK).cmple(n).all() && (m - SLACK).cmple(h).all()
+            }
+            _ => false,
+        };
+        free.iter().any(|a| held.iter().any(|b| touches(a, b)))
     }
 
     /// What people call the member of that id; the id itself where there is no such member.

@@ -166,13 +166,13 @@ impl Whole {
     }
 }
 
-/// The whole of a scene whose members [bear as one](intrados_scene::Structure::bears_as_one); none
+/// The whole of a scene whose members [bear as one](intrados_scene::Scene::bears_as_one); none
 /// where they do not, and each is as its own supports hold it.
 ///
 /// # Errors
 /// As [`whole`].
 pub fn joined(scene: &Scene, job: &Job) -> Result<Option<Whole>, FrameError> {
-    scene.structure.bears_as_one().then(|| whole(scene, false, job)).transpose()
+    scene.bears_as_one().then(|| whole(scene, false, job)).transpose()
 }
 
 /// A model with the equilibria of all its cases.
@@ -278,6 +278,9 @@ fn tell_assumptions(draft: &mut Draft) {
         draft.notes.push(format!(
             "{touching} joints by touching alone are monolithic: name bearings and hinges in joints of the scene"
         ));
+    }
+    if touching > 0 && !draft.scene.bears_as_one() {
+        draft.notes.push("without --whole and in `predict` each of these members is computed by its own supports: name joints, or mark supports that stand for other members alone: true, and loads are handed on there, too".into());
     }
     let mirrored = draft.parts.iter().map(|p| draft.scene.structure.mirrored(&p.assembly.id));
     if mirrored.flatten().any(|is_plane| is_plane) {

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use intrados_scene::structure::{self, Body as Shape, GroundModel, Hold, Place};
 
 use super::{
@@ -30,6 +30,8 @@ const LOOKS: f64 = 0.7;
 const FIRST: f64 = DAY;
 /// Cosine from which on a member lies along an axis of the world: single precision turns it less.
 const ALONG: f64 = 1.0 - 1e-8;
+/// How far off a line across may lie that stands for one, of the length.
+const NEAR_LINE: f64 = 0.1;
 /// Said of a ring that its ground only beds.
 const UNPRESSED: &str = "nothing presses the ring on its ground: as it shrinks it may part from it, and rest where no equilibrium is found; give cover_m and weight_kn_m3, or water_m";
 /// Said of what is computed up to a plane of symmetry.
@@ -415,19 +417,43 @@ impl Draft<'_> {
         let mut nodes: Vec<u32> = match *place {
             // A line across: a bearing that lets the member turn.
             Place::Surface { from, to, side_deg } if to - from < 1e-6 => {
-                let (z, reach) =
-                    (f64::from(from) * self.axes.length, 1e-6 * self.axes.length.max(1.0));
                 let around = Place::Surface { from: 0.0, to: 1.0, side_deg };
                 let of_side = self.faces(&around).into_iter().flat_map(|face| mesh.face(face));
-                of_side
-                    .filter(|&n| (self.axes.local(mesh.nodes[n as usize]).z - z).abs() < reach)
-                    .collect()
+                self.line_across(of_side.collect(), f64::from(from) * self.axes.length)
             }
             _ => self.faces(place).into_iter().flat_map(|face| mesh.face(face)).collect(),
         };
         nodes.sort_unstable();
         nodes.dedup();
         nodes
+    }
+
+    /// Of the nodes of a side, those on a line across it at `z` along the axis. Cubes that fill a
+    /// surface need no layer of corners there, and none of full width at an end that is cut
+    /// askew: the nearest layer counts that is half as wide as the widest.
+    fn line_across(&self, side: BTreeSet<u32>, z: f64) -> Vec<u32> {
+        let reach = 1e-6 * self.axes.length.max(1.0);
+        let mut nodes: Vec<(DVec3, u32)> = side
+            .into_iter()
+            .map(|n| (self.axes.local(self.model.mesh.nodes[n as usize]), n))
+            .collect();
+        nodes.retain(|(at, _)| (at.z - z).abs() <= NEAR_LINE * self.axes.length + reach);
+        nodes.sort_by(|a, b| a.0.z.total_cmp(&b.0.z));
+        let layers: Vec<&[(DVec3, u32)]> =
+            nodes.chunk_by(|a, b| (b.0.z - a.0.z).abs() <= reach).collect();
+        let width = |layer: &[(DVec3, u32)]| {
+            let [low, high] =
+                layer.iter().fold([DVec2::INFINITY, DVec2::NEG_INFINITY], |[l, h], (at, _)| {
+                    [l.min(at.truncate()), h.max(at.truncate())]
+                });
+            (high - low).max_element()
+        };
+        let widest = layers.iter().map(|l| width(l)).fold(0.0, f64::max);
+        let off =
+            |layer: &[(DVec3, u32)]| layer.first().map_or(f64::INFINITY, |n| (n.0.z - z).abs());
+        let nearest = (layers.into_iter().filter(|l| width(l) >= 0.5 * widest))
+            .min_by(|a, b| off(a).total_cmp(&off(b)));
+        nearest.into_iter().flatten().map(|n| n.1).collect()
     }
 
     /// Moments to stop at, s: all events, and between them steps that grow with the time since the

@@ -1,10 +1,13 @@
 //! What can be computed as it is written, and is probably not meant.
 
 mod bars;
+mod unloaded;
 
 use std::f32::consts::TAU;
 
 use super::*;
+
+pub(crate) use unloaded::unloaded;
 
 /// Share of a section beyond which bars are rarely meant, outside of laps (EN 1992-1-1, 9.2.1.1 and
 /// 9.5.2).
@@ -17,9 +20,9 @@ pub(crate) const CLASSES: [&str; 18] = [
 ];
 
 /// One line for everything that a scene probably does not mean. What is wrong for certain,
-/// [`check`] lists.
+/// [`check`] lists. `as_one`: whether what nothing holds is carried by others.
 #[must_use]
-pub(crate) fn doubts(scene: &SceneFile) -> Vec<String> {
+pub(crate) fn doubts(scene: &SceneFile, as_one: bool) -> Vec<String> {
     let mut doubts = Vec::new();
     for member in &scene.members {
         if let Some(share) = member.body.steel_share().filter(|&share| share > MUCH_STEEL) {
@@ -34,7 +37,9 @@ pub(crate) fn doubts(scene: &SceneFile) -> Vec<String> {
     doubts.extend(scene.members.iter().flat_map(|m| bars::short_laps(m, fck(scene, m))));
     doubts.extend(scene.members.iter().filter_map(bars::unused_ends));
     doubts.extend(scene.members.iter().filter_map(no_class));
-    doubts.extend(scene.members.iter().filter_map(|member| unheld(scene, member)));
+    if !as_one {
+        doubts.extend(scene.members.iter().filter_map(|member| unheld(scene, member)));
+    }
     doubts.extend(scene.details.iter().filter_map(|detail| unattacked(scene, detail)));
     for load in &scene.loads {
         let bear = |m: &&Member| load.members.is_empty() || load.members.contains(&m.id);
@@ -153,7 +158,7 @@ mod tests {
     fn doubts_with(from: &str, to: &str) -> Vec<String> {
         let text = crate::parametric::template("column").unwrap();
         assert!(text.contains(from), "{from}");
-        doubts(&parse("column", &text.replace(from, to)).unwrap())
+        doubts(&parse("column", &text.replace(from, to)).unwrap(), false)
     }
 
     #[test]

@@ -14,7 +14,7 @@ use super::{
     buried::buried,
     doubts,
     evidence::{Evidence, place},
-    unknown_members,
+    unknown_members, unloaded,
 };
 use crate::{
     Assembly, Frame, LampKind, LoadError, MemberKind, Mesh, Object, Part, Scene, SteelLine,
@@ -253,13 +253,9 @@ impl Builder<'_> {
             Shape::Mesh { name, file, transform, material, emission } => {
                 let path = self.sources.path(file)?;
                 let bytes = self.sources.read(&path, 1 << 30)?;
-                (
-                    name,
-                    super::obj::read(&path.display().to_string(), &bytes)?,
-                    transform.matrix(),
-                    material,
-                    emission,
-                )
+                let (mesh, notes) = super::obj::read(&path.display().to_string(), &bytes)?;
+                self.scene.warnings.extend(notes);
+                (name, mesh, transform.matrix(), material, emission)
             }
         };
         let kind = match shape {
@@ -404,7 +400,8 @@ impl Builder<'_> {
         self.furnish(name, &file.details)?;
         suspicious(&mut self.scene);
         classless(&mut self.scene);
-        self.scene.warnings.extend(doubts(file));
+        self.scene.warnings.extend(doubts(file, self.scene.bears_as_one()));
+        self.scene.warnings.extend(unloaded(&self.scene));
         Ok(())
     }
 

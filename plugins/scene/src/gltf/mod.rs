@@ -53,7 +53,7 @@ mod write;
 use std::sync::Arc;
 
 pub use import::import;
-pub(crate) use import::import_within;
+pub(crate) use import::{import_near, import_within};
 pub use problem::{GltfProblem, ImportError, Place, Severity};
 pub use validate::{validate, validate_within};
 pub use write::{write_glb, write_glb_with};
@@ -72,6 +72,8 @@ const MAX_DEPTH: usize = 256;
 
 /// What is noted of members whose concrete nobody states, behind their number.
 pub(crate) const NO_CLASS: &str = "members state no concrete class";
+/// What a note of a model without members begins with.
+pub(crate) const NO_MEMBERS: &str = "no structural members";
 /// What is noted of a model whose size is doubted, behind it.
 pub(crate) const NO_UNIT: &str = "mm or m? glTF is in metres";
 

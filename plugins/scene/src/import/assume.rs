@@ -130,6 +130,56 @@ pub(super) fn reinforcement(m: &Measures, fck: f64, cover_mm: f32) -> Option<Rei
     })
 }
 
+/// Of concrete with its bars, N/m³.
+const WEIGHT: f64 = 25e3;
+
+/// What assumed bars come to under what surely acts.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Carrying {
+    /// The least carry it.
+    Least,
+    /// They do not, and these below do.
+    More(Bars),
+    /// No bars do in this section.
+    Nothing,
+}
+
+/// Whether the least bars below carry a member's own weight and `imposed`, N/m², over a span as a
+/// simple beam, w l²/8 against A_s f_yk .9 d; else those that EN 1992-1-1 asks for, 1.35 of weight
+/// and 1.5 of the rest against A_s f_yd .9 d, as long as concrete bears it without bars above:
+/// M ≤ .167 f_ck b d², which is x = .45 d with f_cd = .85 f_ck / 1.5.
+pub(super) fn carrying(
+    m: &Measures,
+    least: &Reinforcement,
+    span: f64,
+    fck: f64,
+    imposed: f64,
+) -> Carrying {
+    let grade = least.grade();
+    let fyk = grade.map_or(500e6, |g| 1e6 * f64::from(g.yield_mpa));
+    let [depth, width] = m.across;
+    let cover = 1e-3 * f64::from(least.cover_mm);
+    let d = depth - cover - 0.02;
+    let below = least.bars.iter().find(|b| matches!(b, Bars::Row { side_deg: 180.0, .. }));
+    let area = below.map_or(0.0, |b| f64::from(b.area()));
+    let moment = |weight: f64, rest: f64| {
+        (weight * WEIGHT * m.area + rest * imposed * width) * span * span / 8.0
+    };
+    if d <= 0.0 || moment(1.0, 1.0) <= area * fyk * 0.9 * d {
+        return Carrying::Least;
+    }
+    let designed = moment(1.35, 1.5);
+    let needed = designed / (0.9 * d * fyk / 1.15);
+    if designed > 0.167e6 * fck * width * d * d {
+        return Carrying::Nothing;
+    }
+    let is_beam = width < 5.0 * depth && m.kind != MemberKind::Slab;
+    let apart = if is_beam { 0.3 } else { (3.0 * depth).min(0.4) };
+    let (count, diameter_mm) = bars(needed, width - 2.0 * cover, apart, 12.0);
+    let row = Bars::row(180.0, count, diameter_mm);
+    if f64::from(row.area()) < 0.999 * needed { Carrying::Nothing } else { Carrying::More(row) }
+}
+
 type Laid = (Vec<Bars>, (f32, f32));
 
 /// Bars around a section, and links of §9.5.3: at least 6 mm and a quarter of the bar, at most 20
@@ -256,6 +306,33 @@ mod tests {
         // ρ_w = A_sw / (s b) ≥ .08 √30 / 500 = .876 ‰
         let legs = 2.0 * std::f32::consts::FRAC_PI_4 * s.diameter_mm.powi(2);
         assert!(legs / (s.spacing_mm * 300.0) >= 0.876e-3 && s.spacing_mm <= 400.0, "{s:?}");
+    }
+
+    /// By hand: a beam of .3 × .6 m weighs 4.5 kN/m. Over 6 m its least bars (4.9 cm² at most) carry
+    /// 20 kNm; over 16 m they do not carry 144 kNm, and 1.35 · 144 kNm against 434.8 MPa · .9 · .54 m
+    /// take 9.2 cm². Over 60 m no bars do: 1.35 · 2025 kNm are more than .167 · 30 MPa b d², 438 kNm.
+    #[test]
+    fn bars_carry_their_members_or_are_told_not_to() {
+        let beam = member(MemberKind::Beam, 6.0, [0.6, 0.3]);
+        let least = reinforcement(&beam, 30.0, 40.0).unwrap();
+        let over = |span: f64, imposed: f64| carrying(&beam, &least, span, 30.0, imposed);
+        assert_eq!(over(6.0, 0.0), Carrying::Least);
+        match over(16.0, 0.0) {
+            Carrying::More(row) => {
+                let needed = 1.35 * 144e3 / (0.9 * 0.54 * 434.8e6);
+                assert!((needed..1.3 * needed).contains(&area(&row)), "{row:?} for {needed}");
+            }
+            other => panic!("{other:?}"),
+        }
+        assert_eq!(over(60.0, 0.0), Carrying::Nothing);
+        // What people say that it carries counts, too: from least to most it asks for more.
+        let rank = |answer: Carrying| match answer {
+            Carrying::Least => 0.0,
+            Carrying::More(row) => 1.0 + area(&row),
+            Carrying::Nothing => f64::INFINITY,
+        };
+        let ranks = [0.0, 10e3, 20e3, 40e3, 80e3, 1e6].map(|imposed| rank(over(10.0, imposed)));
+        assert!(ranks.windows(2).all(|w| w[0] <= w[1]) && ranks[5].is_infinite(), "{ranks:?}");
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! From elements to a model of members with their steel: kinds, names, hosts, frames.
 
 use std::{
-    collections::{BTreeMap, HashMap, HashSet},
+    collections::{BTreeMap, BTreeSet, HashMap, HashSet},
     sync::Arc,
 };
 
@@ -12,7 +12,7 @@ use serde_json::Value;
 use super::{
     KindByName,
     ask::Idle,
-    close::close,
+    close::{close, is_closed},
     count, course, grade,
     kind::{By, Verdict, Why, kind, lies_on_ground, likely},
     model::material,
@@ -105,6 +105,7 @@ pub(super) fn build(
         colours: HashMap::new(),
         surfaces: Vec::new(),
         renamed: Vec::new(),
+        dropped: BTreeSet::new(),
     };
     builder.clear();
     let mut pieces = Vec::with_capacity(elements.len());
@@ -114,18 +115,15 @@ pub(super) fn build(
         element.surface.points.iter_mut().for_each(|p| *p -= builder.built.offset);
         let of_courses = element.courses.iter_mut().flat_map(|c| &mut c.line);
         of_courses.for_each(|p| *p -= builder.built.offset);
-        if element.objects.is_empty()
-            && !close(&mut element.surface)
-            && element.class.starts_with("Ifc")
-        {
-            open += 1;
-        }
+        let is_closed = builder.close(&mut element);
         let (solid, tube) = (boxed(&element.surface), tube(&element.surface));
         let verdict = match kinds.iter().find(|k| k.is_of(&element)).map(|k| k.kind) {
             Some(Some(kind)) => Verdict::Member(kind, By::User),
             Some(None) => Verdict::Scenery(Why::Name),
             None => kind(&element, solid.as_ref(), tube.as_ref()),
         };
+        let counts = matches!(verdict, Verdict::Member(..)) || element.class.starts_with("Ifc");
+        open += usize::from(!is_closed && counts && !element.surface.is_empty());
         pieces.push(Piece { element, verdict, tube, segments: Vec::new() });
     }
     let pieces = count::once(pieces, &mut builder.built.notes);
@@ -150,7 +148,9 @@ pub(super) fn build(
         ));
     }
     builder.tell();
+    builder.drop();
     builder.built.surfaces = builder.surfaces.into_iter().map(|(surface, _)| surface).collect();
+    builder.built.offset += source.moved;
     Ok(builder.built)
 }
 
@@ -174,6 +174,8 @@ struct Builder {
     surfaces: Vec<(Surface, [DVec3; 2])>,
     /// GlobalIds that another element has, too.
     renamed: Vec<String>,
+    /// Objects of the model that another shows now.
+    dropped: BTreeSet<usize>,
 }
 
 impl Builder {
@@ -212,6 +214,53 @@ impl Builder {
             (object.member, object.part) = (None, Part::Scenery);
             object.transform = back * object.transform;
         }
+    }
+
+    /// Closes an element's surface; whether it is closed now. One that came with a model and was
+    /// open is shown by its first object from now on.
+    fn close(&mut self, element: &mut Element) -> bool {
+        let Some((&first, others)) = element.objects.split_first() else {
+            return close(&mut element.surface);
+        };
+        if element.surface.is_empty() || is_closed(&element.surface) {
+            return true;
+        }
+        let mut closed = element.surface.clone();
+        if !close(&mut closed) {
+            return false;
+        }
+        self.dropped.extend(others);
+        let origin = closed.bounds()[0].round();
+        let positions = closed.points.iter().map(|p| (*p - origin).as_vec3()).collect();
+        let mesh = Mesh { positions, triangles: closed.triangles.clone(), ..Mesh::default() };
+        let model = &mut self.built.model;
+        model.meshes.push(Arc::new(mesh));
+        if let Some(object) = model.objects.get_mut(first) {
+            object.mesh = model.meshes.len() - 1;
+            object.transform = Mat4::from_translation(origin.as_vec3());
+        }
+        (element.surface, element.objects) = (closed, vec![first]);
+        true
+    }
+
+    /// Takes out the objects that others show.
+    fn drop(&mut self) {
+        if self.dropped.is_empty() {
+            return;
+        }
+        let Model { objects, steel, .. } = &mut self.built.model;
+        let kept = (0..objects.len()).filter(|i| !self.dropped.contains(i));
+        let places: BTreeMap<usize, usize> =
+            kept.enumerate().map(|(to, from)| (from, to)).collect();
+        let mut index = 0..;
+        objects.retain(|_| index.next().is_some_and(|i| places.contains_key(&i)));
+        steel.retain_mut(|(object, _)| match places.get(object) {
+            Some(place) => {
+                *object = *place;
+                true
+            }
+            None => false,
+        });
     }
 
     /// A text that is not taken yet: `pier`, `pier #2`.

@@ -3,14 +3,18 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use glam::{DVec2, DVec3};
+use glam::DVec3;
 
 use super::source::Surface;
+use crate::polygon;
 
-/// Corners that are nearer than this are one, m.
-const SAME: f64 = 1e-5;
-/// So near to an edge a corner lies on it, m.
-const ON_EDGE: f64 = 1e-4;
+/// Corners that are nearer than this are one, m: tried one after the other, from rounding to what a
+/// model was drawn to.
+const SAME: [f64; 3] = [1e-5, 1e-4, 1e-3];
+/// That, of a body's least measure, at most.
+const LEAST: f64 = 0.02;
+/// So near to an edge a corner lies on it, in distances at which corners are one.
+const ON_EDGE: f64 = 10.0;
 /// Longest edge of a hole, in corners, that is filled.
 const MOST_CORNERS: usize = 2000;
 /// Rounds of splitting edges.
@@ -18,14 +22,38 @@ const ROUNDS: usize = 20;
 
 /// Whether the surface is closed now.
 pub(super) fn close(surface: &mut Surface) -> bool {
-    weld(surface);
+    let [low, high] = surface.bounds();
+    let most = LEAST * (high - low).min_element();
+    for same in SAME.into_iter().filter(|same| *same == SAME[0] || *same < most) {
+        let mut closed = surface.clone();
+        if closed_within(&mut closed, same) {
+            *surface = closed;
+            return true;
+        }
+    }
+    // What is left open is at least tidy.
+    closed_within(surface, SAME[0])
+}
+
+/// Whether a surface is closed as it is, each face once.
+pub(super) fn is_closed(surface: &Surface) -> bool {
+    let mut welded = surface.clone();
+    weld(&mut welded, SAME[0]);
+    let count = welded.triangles.len();
+    undouble(&mut welded);
+    welded.triangles.len() == count && open_edges(&welded).is_empty()
+}
+
+fn closed_within(surface: &mut Surface, same: f64) -> bool {
+    weld(surface, same);
+    undouble(surface);
     if open_edges(surface).is_empty() {
         outward(surface);
         return true;
     }
     orient(surface);
     for _ in 0..ROUNDS {
-        if !split(surface) {
+        if !split(surface, same) {
             break;
         }
     }
@@ -40,14 +68,31 @@ fn outward(surface: &mut Surface) {
     }
 }
 
+/// Drops faces that come again: all that are walked the same way, and where every face comes both
+/// ways, as programs draw both sides of a sheet, one of each pair.
+fn undouble(surface: &mut Surface) {
+    let first = |[a, b, c]: [u32; 3]| match a.min(b).min(c) {
+        low if low == a => [a, b, c],
+        low if low == b => [b, c, a],
+        _ => [c, a, b],
+    };
+    let mut known: BTreeSet<[u32; 3]> = BTreeSet::new();
+    surface.triangles.retain(|t| known.insert(first(*t)));
+    let back = |[a, b, c]: [u32; 3]| first([a, c, b]);
+    if !known.is_empty() && known.iter().all(|t| known.contains(&back(*t))) {
+        surface.triangles.retain(|t| first(*t) < back(*t));
+        orient(surface);
+    }
+}
+
 /// One corner a place; triangles without area are no triangles.
-fn weld(surface: &mut Surface) {
+fn weld(surface: &mut Surface, same: f64) {
     let Some(origin) = surface.points.first().copied() else { return };
     let mut cells: BTreeMap<[i64; 3], Vec<u32>> = BTreeMap::new();
     let mut points: Vec<DVec3> = Vec::new();
     let mut place = Vec::with_capacity(surface.points.len());
     for &p in &surface.points {
-        let cell = ((p - origin) / SAME).floor().to_array().map(|x| x as i64);
+        let cell = ((p - origin) / same).floor().to_array().map(|x| x as i64);
         let near =
             (-1..=1).flat_map(|x| (-1..=1).flat_map(move |y| (-1..=1).map(move |z| [x, y, z])));
         let known = near
@@ -55,7 +100,7 @@ fn weld(surface: &mut Surface) {
             .filter_map(|c: [i64; 3]| cells.get(&c))
             .flatten()
             .copied()
-            .find(|&i| points.get(i as usize).is_some_and(|q| q.distance(p) < SAME));
+            .find(|&i| points.get(i as usize).is_some_and(|q| q.distance(p) < same));
         place.push(known.unwrap_or_else(|| {
             points.push(p);
             let index = points.len() as u32 - 1;
@@ -133,7 +178,7 @@ fn orient(surface: &mut Surface) {
 }
 
 /// Splits open edges at corners of other open edges that lie on them. Gives whether there were any.
-fn split(surface: &mut Surface) -> bool {
+fn split(surface: &mut Surface, same: f64) -> bool {
     let open = open_edges(surface);
     let corners: BTreeSet<u32> = open.iter().flat_map(|&(a, b)| [a, b]).collect();
     let at = |i: u32| surface.points.get(i as usize).copied().unwrap_or_default();
@@ -146,9 +191,9 @@ fn split(surface: &mut Surface) -> bool {
             let way = (at(c) - p).dot(along);
             c != a
                 && c != b
-                && way > SAME
-                && way < length - SAME
-                && (at(c) - p - way * along).length() < ON_EDGE
+                && way > same
+                && way < length - same
+                && (at(c) - p - way * along).length() < ON_EDGE * same
         };
         let nearest = |&c: &u32| (at(c) - p).dot(along);
         let found = corners
@@ -212,48 +257,12 @@ fn fill(surface: &mut Surface) {
     }
 }
 
-/// Triangles of a ring: its ears are cut off one by one, in the plane that fits it best.
+/// Triangles of a ring; none where it is too tangled.
 fn faces(points: &[DVec3], ring: &[u32]) -> Vec<[u32; 3]> {
-    let at = |i: u32| points.get(i as usize).copied().unwrap_or_default();
-    let mut ring = ring.to_vec();
-    let mut triangles = Vec::new();
-    // Newell's normal.
-    let normal: DVec3 =
-        (0..ring.len()).map(|k| at(ring[k]).cross(at(ring[(k + 1) % ring.len()]))).sum();
-    let Some(normal) = normal.try_normalize() else {
-        // All on one line: edges that fold onto each other.
-        return fan(&ring);
-    };
-    let x = normal.any_orthonormal_vector();
-    let y = normal.cross(x);
-    let flat = |i: u32| DVec2::new(at(i).dot(x), at(i).dot(y));
-    while ring.len() > 3 {
-        let n = ring.len();
-        let ear = (0..n).find(|&k| {
-            let [a, b, c] = [ring[(k + n - 1) % n], ring[k], ring[(k + 1) % n]];
-            let [p, q, r] = [a, b, c].map(flat);
-            let turns = (q - p).perp_dot(r - q);
-            let holds = |i: &u32| {
-                let s = flat(*i);
-                ![a, b, c].contains(i)
-                    && (q - p).perp_dot(s - p) >= 0.0
-                    && (r - q).perp_dot(s - q) >= 0.0
-                    && (p - r).perp_dot(s - r) >= 0.0
-            };
-            turns > 1e-12 && !ring.iter().any(holds)
-        });
-        // Corners on a straight edge are no ears; what is left then is cut as a fan.
-        let Some(k) = ear else { break };
-        triangles.push([ring[(k + n - 1) % n], ring[k], ring[(k + 1) % n]]);
-        ring.remove(k);
-    }
-    triangles.extend(fan(&ring));
-    triangles
-}
-
-fn fan(ring: &[u32]) -> Vec<[u32; 3]> {
-    let [first, rest @ ..] = ring else { return Vec::new() };
-    rest.windows(2).map(|w| [*first, w[0], w[1]]).collect()
+    let at: Vec<DVec3> =
+        ring.iter().map(|&i| points.get(i as usize).copied().unwrap_or_default()).collect();
+    let found = polygon::triangulate(&at).unwrap_or_default();
+    found.triangles.into_iter().map(|t| t.map(|k| ring[k])).collect()
 }
 
 #[cfg(test)]
@@ -289,6 +298,34 @@ mod tests {
         assert!((surface.volume() - 1.8).abs() < 1e-6 && surface.triangles.len() == 12);
     }
 
+    /// Both sides of every face drawn; every face twice; corners apart by hundredths of a millimetre
+    /// and by half of one.
+    #[test]
+    fn doubled_faces_and_small_gaps_are_closed() {
+        let mut both = block();
+        both.triangles.extend(block().triangles.iter().map(|&[a, b, c]| [a, c, b]));
+        let mut twice = block();
+        twice.triangles.extend(block().triangles.iter().map(|&[a, b, c]| [b, c, a]));
+        let gaps = |wide: f64| {
+            let block = block();
+            let corners = block.triangles.iter().flatten().map(|&i| block.points[i as usize]);
+            let off = |k: usize| wide * (0.5 - (k * 7 % 11) as f64 / 11.0);
+            let points: Vec<DVec3> = corners
+                .enumerate()
+                .map(|(k, p)| p + DVec3::new(off(k), off(k + 3), off(k + 5)))
+                .collect();
+            let all = 0..points.len() as u32 / 3;
+            Surface { triangles: all.map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect(), points }
+        };
+        for mut surface in [both, twice, gaps(3e-5), gaps(5e-4)] {
+            assert!(!is_closed(&surface));
+            assert!(close(&mut surface));
+            assert!((surface.volume() - 1.8).abs() < 5e-3, "{}", surface.volume());
+            assert_eq!(surface.triangles.len(), 12);
+        }
+        assert!(is_closed(&block()));
+    }
+
     /// One face is cut in two at the middle of its edge, its neighbours do not know.
     #[test]
     fn a_corner_on_a_neighbours_edge_closes() {
@@ -300,7 +337,7 @@ mod tests {
         surface.triangles[0] = [a, m, c];
         surface.triangles.push([m, b, c]);
         let mut welded = surface.clone();
-        weld(&mut welded);
+        weld(&mut welded, SAME[0]);
         assert!(!open_edges(&welded).is_empty());
         assert!(close(&mut surface));
         assert!((surface.volume() - 1.8).abs() < 1e-6);

@@ -348,6 +348,7 @@ fn source(answer: Answer, shapes: &[u8]) -> Result<Source, String> {
     let scale = answer.metres_per_unit;
     let georeference = georeference::resolve(answer.georeference, scale, &mut notes);
     Ok(Source {
+        moved: DVec3::ZERO,
         format: format!("{} in {unit}, by IfcOpenShell {}", answer.schema, answer.ifcopenshell),
         is_ifc: true,
         project: answer.project,

@@ -16,6 +16,7 @@ mod close;
 mod convert;
 mod count;
 mod course;
+mod doubt;
 mod georeference;
 mod grade;
 mod ground;
@@ -46,6 +47,8 @@ use crate::{LoadError, MemberKind, Scene, problem::unwritten};
 pub struct Told {
     /// Metres per unit of the file, where its format says none (glTF says metres).
     pub metres: Option<f64>,
+    /// Which axis of the file points up, where its format says none (glTF says y).
+    pub up: Option<UpAxis>,
     /// When it was built.
     pub year: Option<i32>,
     /// Classes of EN 206 that attack all of it.
@@ -70,6 +73,16 @@ impl KindByName {
         let is = |own: &str| own.trim().eq_ignore_ascii_case(self.name.trim());
         is(&element.name) || is(&element.id)
     }
+}
+
+/// Which axis of a file points up.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum UpAxis {
+    /// As in glTF and in this program.
+    #[default]
+    Y,
+    /// As in most programs for structures; x, y and z become x, z and −y.
+    Z,
 }
 
 /// What came of an import.
@@ -200,15 +213,17 @@ pub fn import(
     writable(folder)?;
     let extension =
         path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
-    let metres = told.metres.unwrap_or(1.0);
+    if extension == "ifc" && told.up.is_some() {
+        return Err(ImportError::bad(path, "IFC says which way is up: leave --up out"));
+    }
     if extension == "ifc" && told.metres.is_some() {
         let what = "IFC says in which unit it is: leave --unit out, and export the model again where its unit is wrong or missing";
         return Err(ImportError::bad(path, what));
     }
     let (source, model) = match extension.as_str() {
         "ifc" => (convert::ifc(path, &job.part(0.0, 0.8))?, crate::gltf::Model::default()),
-        "glb" | "gltf" => model::gltf(path, told.metres, access, job)?,
-        "obj" => model::obj(path, metres)?,
+        "glb" | "gltf" => model::gltf(path, told, access, job)?,
+        "obj" => model::obj(path, told)?,
         _ => {
             // A missing file is missing whatever its name is.
             intrados_stage::access::open(path).map_err(|e| ImportError::denied(path, &e))?;
@@ -222,6 +237,9 @@ pub fn import(
     unknown_names(path, &source, &told.kinds)?;
     let mut built = build::build(&source, model, &told.kinds, &job.part(0.8, 0.95))?;
     measure(path, &mut built, told, extension == "ifc")?;
+    if extension != "ifc" {
+        built.notes.extend(doubt::doubts(&source, &built, told));
+    }
     project::write(path, folder, &source, &built, told, &job.part(0.95, 1.0))
 }
 
@@ -311,4 +329,38 @@ fn measure(
         path,
         format!("the model is {size:.4} m across: mm or m? say it, with --unit mm or --unit m"),
     ))
+}
+
+#[cfg(test)]
+mod scratch {
+    #[test]
+    fn scratch_print_all() {
+        let Some(folder) = std::env::var_os("SCRATCH") else { return };
+        let mut files: Vec<_> =
+            std::fs::read_dir(folder).unwrap().map(|f| f.unwrap().path()).collect();
+        files.sort();
+        for path in files {
+            let out = tempfile::tempdir().unwrap();
+            let told = super::Told::default();
+            let found = super::import(
+                &path,
+                &out.path().join("o"),
+                &told,
+                &Default::default(),
+                &Default::default(),
+            );
+            println!("=== {}", path.file_name().unwrap().to_string_lossy());
+            match found {
+                Err(e) => println!("   REFUSED {e}"),
+                Ok(found) => {
+                    let text = std::fs::read_to_string(out.path().join("o/scene.ron")).unwrap();
+                    for l in text.lines().filter(|l| l.contains("m across")) {
+                        println!("   {}", l.trim());
+                    }
+                    println!("   offset {:?}", found.offset_m);
+                    found.notes.iter().for_each(|n| println!("   - {n}"));
+                }
+            }
+        }
+    }
 }

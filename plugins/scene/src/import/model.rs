@@ -2,15 +2,15 @@
 
 use std::path::Path;
 
-use glam::{DMat4, DVec3};
+use glam::{DMat3, DMat4, DVec3};
 use intrados_stage::{Access, Job, access};
 
 use super::{
-    ImportError,
+    ImportError, Told, UpAxis,
     source::{Course, Element, Matter, Said, Source, Surface},
 };
 use crate::{
-    LoadError, Material, Mesh, Object, Part, file,
+    LoadError, Material, Object, Part, file,
     gltf::{self, Model},
 };
 
@@ -20,14 +20,15 @@ const LONGEST_OBJ: u64 = 1 << 30;
 /// A glTF file: the model, and its members and other objects as elements.
 pub(super) fn gltf(
     path: &Path,
-    told: Option<f64>,
+    told: &Told,
     access: &Access,
     job: &Job,
 ) -> Result<(Source, Model), ImportError> {
-    let metres = told.unwrap_or(1.0);
-    let mut model = gltf::import_within(path, access, &job.part(0.0, 0.5))
+    let metres = told.metres.unwrap_or(1.0);
+    let to_ours = to_ours(told);
+    let (mut model, moved) = gltf::import_near(path, metres, access, &job.part(0.0, 0.5))
         .map_err(|e| ImportError::Load(LoadError::of_import(path, e)))?;
-    scale(&mut model, metres);
+    turn(&mut model, to_ours, metres);
     let mut elements: Vec<Element> = Vec::new();
     let mut known = std::collections::BTreeMap::new();
     for (i, object) in model.objects.iter().enumerate() {
@@ -60,33 +61,43 @@ pub(super) fn gltf(
         // doubted in metres nothing is left to say once the unit is told.
         notes: std::mem::take(&mut model.warnings)
             .into_iter()
-            .filter(|note| !note.contains(gltf::NO_CLASS))
-            .filter(|note| told.is_none() || !note.contains(gltf::NO_UNIT))
+            .filter(|note| !note.contains(gltf::NO_CLASS) && !note.contains(gltf::NO_MEMBERS))
+            .filter(|note| told.metres.is_none() || !note.contains(gltf::NO_UNIT))
             .collect(),
         elements,
         metres_per_unit: metres,
+        moved: to_ours * moved,
         ..Source::default()
     };
     Ok((source, model))
 }
 
-/// In metres, where the file is not.
-fn scale(model: &mut Model, metres: f64) {
-    #[expect(clippy::float_cmp, reason = "1 is what is written where nothing is to be done")]
-    if metres == 1.0 {
+/// From the file's coordinates to ours: m, y up.
+fn to_ours(told: &Told) -> DMat3 {
+    let turn = match told.up.unwrap_or_default() {
+        UpAxis::Y => DMat3::IDENTITY,
+        UpAxis::Z => DMat3::from_cols(DVec3::X, DVec3::NEG_Z, DVec3::Y),
+    };
+    told.metres.unwrap_or(1.0) * turn
+}
+
+/// In metres and with y up, where the file is not.
+fn turn(model: &mut Model, to_ours: DMat3, metres: f64) {
+    if to_ours == DMat3::IDENTITY {
         return;
     }
-    let matrix = glam::Mat4::from_scale(glam::Vec3::splat(metres as f32));
+    let matrix = DMat4::from_mat3(to_ours).as_mat4();
     model.objects.iter_mut().for_each(|o| o.transform = matrix * o.transform);
     model.members.iter_mut().for_each(|m| {
-        m.bounds = m.bounds.map(|b| matrix.transform_point3(b));
+        let [a, b] = m.bounds.map(|b| matrix.transform_point3(b));
+        m.bounds = [a.min(b), a.max(b)];
         m.volume *= metres.powi(3);
         m.frame = crate::Frame::of_box(m.kind, m.bounds);
     });
     for (_, line) in &mut model.steel {
         line.diameter *= metres as f32;
-        line.line.iter_mut().for_each(|p| *p *= metres as f32);
-        line.inward *= metres as f32;
+        line.line.iter_mut().for_each(|p| *p = matrix.transform_point3(*p));
+        line.inward = matrix.transform_vector3(line.inward);
     }
     model.cameras.clear();
     model.lamps.clear();
@@ -141,25 +152,31 @@ fn append(surface: &mut Surface, model: &Model, object: &Object) {
     );
 }
 
-/// An OBJ file: its groups are elements.
-pub(super) fn obj(path: &Path, metres: f64) -> Result<(Source, Model), ImportError> {
+/// An OBJ file: its objects and groups are elements.
+pub(super) fn obj(path: &Path, told: &Told) -> Result<(Source, Model), ImportError> {
     let bytes = access::read(path, LONGEST_OBJ).map_err(|e| ImportError::denied(path, &e))?;
-    let groups =
-        file::obj_groups(&path.display().to_string(), &bytes).map_err(ImportError::Load)?;
-    let of_group = |(name, mesh): (String, Mesh)| Element {
-        id: name.clone(),
-        name,
+    let read =
+        file::read_obj_parts(&path.display().to_string(), &bytes).map_err(ImportError::Load)?;
+    let to_ours = to_ours(told);
+    let element = |part: file::ObjPart| Element {
+        id: part.name.clone(),
+        name: part.name,
+        words: part.words,
+        materials: (part.materials.into_iter())
+            .map(|name| Matter { name, ..Matter::default() })
+            .collect(),
         surface: Surface {
-            points: mesh.positions.iter().map(|p| p.as_dvec3() * metres).collect::<Vec<DVec3>>(),
-            triangles: mesh.triangles,
+            points: part.points.iter().map(|p| to_ours * *p).collect(),
+            triangles: part.triangles,
         },
         ..Element::default()
     };
     let source = Source {
         format: "OBJ".into(),
         project: path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default(),
-        elements: groups.into_iter().map(of_group).collect(),
-        metres_per_unit: metres,
+        elements: read.parts.into_iter().map(element).collect(),
+        metres_per_unit: told.metres.unwrap_or(1.0),
+        notes: read.notes,
         ..Source::default()
     };
     Ok((source, Model::default()))

@@ -17,11 +17,11 @@ use intrados_stage::{
 use super::{
     ImportError, Imported, Told,
     ask::questions,
-    assume::{self, Measures, STEEL, YEARS},
+    assume::{self, Carrying, Measures, STEEL, YEARS},
     build::{Built, Found},
     georeference::words,
     grade::Concrete,
-    ground::{Standing, is_blinding, on_ground},
+    ground::{Standing, is_blinding, on_ground, reaches},
     source::{Source, Surface},
 };
 use crate::{
@@ -44,9 +44,10 @@ pub(super) fn write(
     job: &Job,
 ) -> Result<Imported, ImportError> {
     let year = told.year.or(source.year);
-    let members: Vec<Detail> = (built.found.iter().zip(&built.surfaces))
+    let mut members: Vec<Detail> = (built.found.iter().zip(&built.surfaces))
         .map(|(found, surface)| detail(found, surface, year, told))
         .collect();
+    let carried = carry(&mut members, &standing(built), told);
     let failed = |e: std::io::Error| ImportError::write(folder, &e);
     let parent = match folder.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
@@ -67,7 +68,7 @@ pub(super) fn write(
     put(evidence::NAME, &evidence(&name, built)).map_err(failed)?;
     // What was written must be a scene like any other.
     let scene = Scene::load(&place.join("scene.ron"), job).map_err(|e| unfit(path, place, e))?;
-    let imported = summary(folder, source, built, &members);
+    let imported = summary(folder, source, built, &members, carried);
     put("README.md", &readme(&name, source, built, &members, &imported, &scene, told))
         .map_err(failed)?;
     if folder.is_dir() {
@@ -177,6 +178,79 @@ fn detail<'a>(found: &'a Found, surface: &Surface, year: Option<i32>, told: &Tol
         bare,
         assumed,
     }
+}
+
+/// Gives members that lie more than the least bars where these would not carry them, as anything
+/// that stands is carried; and says so.
+fn carry(members: &mut [Detail], standing: &[Standing], told: &Told) -> Vec<String> {
+    let (mut more, mut nothing) = (Vec::new(), Vec::new());
+    for i in 0..members.len() {
+        let span = span(members, standing, i);
+        let Detail { found, reinforcement: Some(least), strength, concrete, .. } = &mut members[i]
+        else {
+            continue;
+        };
+        let lies = matches!(found.kind, MemberKind::Beam | MemberKind::Slab) && is_level(found);
+        if !lies || found.lies_on_ground {
+            continue;
+        }
+        let fck = f64::from(strength.or(concrete_class(concrete)).unwrap_or(30.0));
+        let imposed = told.imposed_kpa.filter(|_| found.kind == MemberKind::Slab).unwrap_or(0.0);
+        let imposed = 1e3 * f64::from(imposed);
+        let name = format!("\"{}\" over {span:.1} m", crate::file::shorten(&found.name));
+        match assume::carrying(&measures(found), least, span, fck, imposed) {
+            Carrying::Least => {}
+            Carrying::More(row) => {
+                let is_below = |b: &&mut Bars| matches!(b, Bars::Row { side_deg: 180.0, .. });
+                if let Some(below) = least.bars.iter_mut().find(is_below) {
+                    *below = row;
+                }
+                more.push(name);
+            }
+            Carrying::Nothing => nothing.push(name),
+        }
+    }
+    let listed = |names: &[String]| match names.len() {
+        0..=3 => names.join(", "),
+        n => format!("{} and {} more", names[..3].join(", "), n - 3),
+    };
+    let mut notes = Vec::new();
+    if !more.is_empty() {
+        notes.push(format!(
+            "the least bars would not carry the own weight of {}: as many are assumed as EN 1992-1-1 asks for; they say nothing of the bars that are there",
+            listed(&more)
+        ));
+    }
+    if !nothing.is_empty() {
+        notes.push(format!(
+            "no bars carry the own weight of {} in its section: it is prestressed, or held by what the model lacks, or no simple beam; that its life ends by the assumed bars is an assumption and no damage: give reinforcement or supports in scene.ron",
+            listed(&nothing)
+        ));
+    }
+    notes
+}
+
+/// The longest way between what a member that lies rests on, m: its ends, and members that reach up
+/// to it.
+fn span(members: &[Detail], standing: &[Standing], i: usize) -> f64 {
+    let frame = members[i].found.frame;
+    let (length, along) = (frame.axis.length(), frame.axis.normalize_or_zero());
+    let below = standing.iter().enumerate();
+    let below = below.filter(|(k, other)| *k != i && reaches(other, &standing[i]));
+    let held = below.map(|(_, other)| {
+        let [low, high] = other.bounds;
+        let middle = (0.5 * (low + high) - frame.start).dot(along);
+        let half = 0.5 * (high - low).dot(along.abs());
+        [middle - half, middle + half].map(|s| s.clamp(0.0, length))
+    });
+    let mut held: Vec<[f32; 2]> = held.chain([[0.0; 2], [length; 2]]).collect();
+    held.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    let (mut longest, mut to) = (0.0_f32, 0.0_f32);
+    for [from, end] in held {
+        longest = longest.max(from - to);
+        to = to.max(end);
+    }
+    f64::from(longest)
 }
 
 fn measures(found: &Found) -> Measures {
@@ -417,7 +491,7 @@ fn is_level(found: &Found) -> bool {
 }
 
 /// What the ground holds, and for each other member what stands for those that carry it: what
-/// stands is held at its foot, what lies under both ends.
+/// stands is held at its foot, what lies on a bearing under each end.
 fn supports(members: &[Detail], standing: &[Standing]) -> String {
     let mut text = String::from(
         "    // The ground holds what stands on it. The others are carried: their supports, `alone`, hold them only\n    // where each is computed by itself; `analyze --whole` leaves those out and follows the loads down.\n    supports: [\n",
@@ -441,9 +515,10 @@ fn supports(members: &[Detail], standing: &[Standing]) -> String {
         {
             hold("Bottom", "Springs(stiffness_mpa_m: (20, 50, 20), lifts: true)");
         } else if level {
-            hold("Surface(from: 0, to: 0.1, side_deg: 180)", "Fixed");
+            // Bearings: lines across, which let the ends turn; one end alone holds it along.
+            hold("Surface(from: 0, to: 0, side_deg: 180)", "Fixed");
             hold(
-                "Surface(from: 0.9, to: 1, side_deg: 180)",
+                "Surface(from: 1, to: 1, side_deg: 180)",
                 "Directions(x: false, y: true, z: false)",
             );
         } else {
@@ -545,7 +620,13 @@ fn evidence(name: &str, built: &Built) -> String {
     evidence::skeleton(&comment(name), id.get(1..id.len() - 1).unwrap_or_default())
 }
 
-fn summary(folder: &Path, source: &Source, built: &Built, members: &[Detail]) -> Imported {
+fn summary(
+    folder: &Path,
+    source: &Source,
+    built: &Built,
+    members: &[Detail],
+    carried: Vec<String>,
+) -> Imported {
     let mut kinds: BTreeMap<MemberKind, usize> = BTreeMap::new();
     let mut volumes: BTreeMap<MemberKind, f64> = BTreeMap::new();
     for found in &built.found {
@@ -576,6 +657,7 @@ fn summary(folder: &Path, source: &Source, built: &Built, members: &[Detail]) ->
         ));
     }
     notes.extend(bare(members));
+    notes.extend(carried);
     if built.steel.loose > 0 {
         notes.push(format!(
             "{} bars and tendons lie in no member and are shown alone",
@@ -602,7 +684,7 @@ fn summary(folder: &Path, source: &Source, built: &Built, members: &[Detail]) ->
     }
 }
 
-/// Where nothing is a member: what the format needs for one.
+/// What a file of its format needs so that members are found in it.
 fn no_members(source: &Source, built: &Built) -> String {
     if source.is_ifc {
         return format!(
@@ -610,7 +692,19 @@ fn no_members(source: &Source, built: &Built) -> String {
             listed(&built.scenery)
         );
     }
-    "no structural members were found: name nodes COL_…, BEAM_…, SLAB_…, WALL_…, FOOTING_…, LINING_…".into()
+    let needs = match source.format.as_str() {
+        "OBJ" => {
+            "name its objects or groups for what they are (o Column_1, g Beam_2, o Slab_EG, Wall, Footing, Lining)"
+        }
+        _ => {
+            "name nodes for what they are (Column_1, COL_2, BEAM_…, SLAB_…, WALL_…, FOOTING_…, LINING_…), give them extras.intrados, or put a .props.json beside the file"
+        }
+    };
+    let named = source.elements.iter().map(|e| e.name.as_str()).filter(|n| !n.is_empty());
+    let named: Vec<String> =
+        named.take(3).map(|n| format!("\"{}\"", crate::file::shorten(n))).collect();
+    let found = if named.is_empty() { "nothing has a name".into() } else { named.join(", ") };
+    format!("no structural members were found (there are {found}): {needs}")
 }
 
 /// Which members have no bars, and why.
@@ -668,7 +762,7 @@ fn readme(
         imported.loose_steel,
         listed(&imported.scenery)
     );
-    text += &rules(built, members, imported, told.year.or(source.year), told);
+    text += &rules(source, built, members, imported, told.year.or(source.year), told);
     text += "\n## Place\n\n";
     let place = whereabouts(source, built);
     if place.is_empty() {
@@ -689,8 +783,24 @@ fn listed(counts: &BTreeMap<String, usize>) -> String {
     if list.is_empty() { "none".into() } else { list.join(", ") }
 }
 
+/// What was taken for unit and direction of a file that says neither.
+fn orientation(source: &Source, told: &Told) -> String {
+    let unit = told.metres.is_none() && source.format == "OBJ";
+    let up = told.up.is_none() && source.format == "OBJ";
+    match (unit, up) {
+        (true, true) => {
+            "- **Unit and direction**: metres, y up; OBJ says neither: give `--unit` and `--up`.\n"
+        }
+        (true, false) => "- **Unit**: metres; OBJ says none: give `--unit`.\n",
+        (false, true) => "- **Direction**: y up; OBJ says none: give `--up`.\n",
+        (false, false) => "",
+    }
+    .into()
+}
+
 /// The rules by which what nobody stated was assumed, and for how many members.
 fn rules(
+    source: &Source,
     built: &Built,
     members: &[Detail],
     imported: &Imported,
@@ -705,14 +815,15 @@ fn rules(
 - **Concrete** of {} of {all} members ({known}): C12/15 before 1950, C20/25 before 1972, C25/30 before 2001, C30/37 since and where no year is known. This is a rule of Intrados, of no code.\n\
 - **Exposure** of {}: XC4 (wet and dry in turn), XC2 for footings and piles (EN 206, table 1). Salt is not assumed: give `--exposure \"XC4, XD3\"` where it comes.\n\
 - **Age** of {}: {YEARS} years.\n\
-- **Reinforcement** of {}: the least that EN 1992-1-1 allows, {STEEL}: beams §9.2.1.1 and §9.2.2, slabs and footings §9.3.1.1, columns §9.5.2 and §9.5.3, walls and linings §9.6, piles §9.8.5; cover of table 4.4N (structural class S4) and Δc_dev = 10 mm. Bars are straight, and slant as their member tapers; where they would not lie in it, as in an arch, none are assumed, and Remarks say so. Real members have more: their bars are what to look for first.\n\
+- **Reinforcement** of {}: the least that EN 1992-1-1 allows, {STEEL}: beams §9.2.1.1 and §9.2.2, slabs and footings §9.3.1.1, columns §9.5.2 and §9.5.3, walls and linings §9.6, piles §9.8.5; cover of table 4.4N (structural class S4) and Δc_dev = 10 mm. Beams and slabs whose least bars would not carry their own weight over the longest way between what they rest on have as many below as §6.1 asks for, and Remarks say so. Bars are straight, and slant as their member tapers; where they would not lie in it, as in an arch, none are assumed, and Remarks say so. Real members have more: their bars are what to look for first.\n\
 - **Steel grade** of {} bars: {STEEL}.\n\
-- **Supports**: the ground holds footings, approach and base slabs by predefined type or name (springs of 50 MPa/m), tunnels (springs of 40 MPa/m), columns and walls that nothing reaches up to, slabs right below a footing, and the lowest slabs (at their ends: a deck that is modelled alone lies on none). Every other member is held for itself, `alone`, what stands at its foot, what lies under both ends; the whole (`analyze --whole`) leaves those supports out. **Loads**: {}.\n",
+- **Supports**: the ground holds footings, approach and base slabs by predefined type or name (springs of 50 MPa/m), tunnels (springs of 40 MPa/m), columns and walls that nothing reaches up to, slabs right below a footing, and the lowest slabs (at their ends: a deck that is modelled alone lies on none). Every other member is held for itself, `alone`, what stands at its foot, what lies under both ends; the whole (`analyze --whole`) leaves those supports out. What lies rests on a line across its soffit at each end, of which one holds it along, so that its ends turn freely.\n{}- **Loads**: {}.\n",
         imported.concrete_assumed,
         count(Assumed::Exposure),
         count(Assumed::Age),
         imported.reinforcement_assumed,
         built.steel.assumed,
+        orientation(source, told),
         match told.imposed_kpa {
             Some(kpa) => format!("self weight, and {kpa} kN/m² on slabs, as was said"),
             None => "self weight alone: give `--imposed` for what slabs carry".into(),

@@ -23,6 +23,8 @@ pub(super) struct Source {
     pub(super) metres_per_unit: f64,
     /// What a user should know.
     pub(super) notes: Vec<String>,
+    /// What its reader took off all coordinates, m.
+    pub(super) moved: DVec3,
     pub(super) georeference: Georeference,
 }
 

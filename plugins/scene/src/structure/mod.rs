@@ -206,10 +206,9 @@ impl Structure {
         })
     }
 
-    /// Whether its members bear as one: somebody has said how they are joined, or a support is only
-    /// there for members by themselves. Else each is computed as its own supports hold it.
-    #[must_use]
-    pub fn bears_as_one(&self) -> bool {
+    /// Whether something says that its members bear as one: how they are joined, or a support that
+    /// is only there for members by themselves.
+    pub(crate) fn is_joined(&self) -> bool {
         !self.joints.is_empty() || self.supports.iter().any(|s| s.alone)
     }
 

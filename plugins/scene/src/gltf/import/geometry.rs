@@ -1,6 +1,6 @@
 //! Primitives to triangle meshes.
 
-use glam::{Vec2, Vec3, Vec4};
+use glam::{DMat4, DQuat, DVec4, Vec2, Vec3, Vec4};
 use intrados_stage::{Cancelled, Job};
 use serde_json::Value;
 
@@ -17,6 +17,9 @@ use crate::{
         },
     },
 };
+
+/// Most instances of one node.
+const MAX_INSTANCES: usize = 1 << 20;
 
 /// Why decoding ended early.
 pub(super) enum Stop {
@@ -103,6 +106,40 @@ pub(super) fn primitive(
         };
     }
     Ok(Primitive::Triangles(mesh))
+}
+
+/// Transforms of the instances of a node's mesh (`EXT_mesh_gpu_instancing`): translation, rotation
+/// and scale, each a number of times or not at all.
+pub(super) fn instances(document: &Document, json: &Value, job: &Job) -> Result<Vec<DMat4>, Stop> {
+    let attributes = json.field("attributes");
+    let [translation, rotation, scale] =
+        ["TRANSLATION", "ROTATION", "SCALE"].map(|name| attributes.index(name));
+    let mut reader = Reader { document, job, count: 0, kept: None };
+    let Some(first) = translation.or(rotation).or(scale) else { return Ok(Vec::new()) };
+    reader.count = reader.open(first)?.count;
+    if reader.count > MAX_INSTANCES {
+        let message = format!("{} instances are more than {MAX_INSTANCES}", reader.count);
+        return Err(GltfProblem::error("", "TOO_BIG", message, SMALLER).into());
+    }
+    let vectors = |index: Option<usize>, absent: Vec3| match index {
+        Some(index) => reader.vectors(index, Shape::Vec3, Vec3::from_array),
+        None => Ok(vec![absent; reader.count]),
+    };
+    let (moved, scaled) = (vectors(translation, Vec3::ZERO)?, vectors(scale, Vec3::ONE)?);
+    let turned = match rotation {
+        Some(index) => reader.vectors(index, Shape::Vec4, Vec4::from_array)?,
+        None => vec![Vec4::W; reader.count],
+    };
+    let one = |((moved, turned), scaled): ((Vec3, Vec4), Vec3)| {
+        let turn = turned.as_dvec4();
+        let turn = if turn.length_squared() > 0.0 { turn.normalize() } else { DVec4::W };
+        DMat4::from_scale_rotation_translation(
+            scaled.as_dvec3(),
+            DQuat::from_vec4(turn),
+            moved.as_dvec3(),
+        )
+    };
+    Ok(moved.into_iter().zip(turned).zip(scaled).map(one).collect())
 }
 
 struct Reader<'a> {

@@ -28,6 +28,21 @@ pub(super) struct Identity {
     alone: bool,
 }
 
+impl Identity {
+    /// Where so much is taken off all coordinates.
+    pub(super) fn moved(mut self, offset: Vec3) -> Self {
+        if let Some(frame) = &mut self.frame {
+            frame.start -= offset;
+        }
+        self
+    }
+
+    /// That of another instance of the same node: a member of its own, unless it is a part of one.
+    pub(super) fn again(&self) -> Self {
+        Self { alone: self.alone || self.part == Part::Concrete, ..self.clone() }
+    }
+}
+
 /// Prefixes of node names, and words in IFC types, that tell the kind.
 const KINDS: [(&str, &str, MemberKind); 10] = [
     ("COL_", "column", MemberKind::Column),

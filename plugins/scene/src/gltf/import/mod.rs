@@ -4,6 +4,7 @@ mod geometry;
 mod light;
 pub(super) mod material;
 pub(super) mod member;
+mod near;
 mod solid;
 
 use std::{collections::HashSet, path::Path, sync::Arc};
@@ -17,7 +18,7 @@ use self::{
     member::{Identity, Members, Properties, Standing},
 };
 use super::{
-    MAX_DEPTH, Model, NO_UNIT,
+    MAX_DEPTH, Model, NO_MEMBERS, NO_UNIT,
     document::Document,
     json::{Json, as_index},
     problem::{
@@ -72,6 +73,29 @@ pub fn import(path: &Path, job: &Job) -> Result<Model, ImportError> {
 /// # Errors
 /// As [`import`].
 pub(crate) fn import_within(path: &Path, access: &Access, job: &Job) -> Result<Model, ImportError> {
+    Ok(read(path, None, access, job)?.0)
+}
+
+/// [`import_within`], moved to the origin where it lies far off, of a file in a unit of so many
+/// metres; and what was taken off all coordinates, in that unit.
+///
+/// # Errors
+/// As [`import`].
+pub(crate) fn import_near(
+    path: &Path,
+    metres: f64,
+    access: &Access,
+    job: &Job,
+) -> Result<(Model, DVec3), ImportError> {
+    read(path, Some(metres), access, job)
+}
+
+fn read(
+    path: &Path,
+    near: Option<f64>,
+    access: &Access,
+    job: &Job,
+) -> Result<(Model, DVec3), ImportError> {
     let mut problems = Vec::new();
     let document = Document::open(path, access, job, &mut problems)?;
     if let Some(document) = &document {
@@ -94,15 +118,16 @@ pub(crate) fn import_within(path: &Path, access: &Access, job: &Job) -> Result<M
     for problem in problems.iter().filter(|p| p.severity == super::Severity::Error) {
         notes.push(problem.to_string());
     }
-    Builder::new(&document, notes).build(job).map_err(|stop| match stop {
+    Builder::new(&document, notes).build(near, job).map_err(|stop| match stop {
         Stop::Damaged(problem) => refuse(problem, 0),
         Stop::Cancelled(cancelled) => cancelled.into(),
     })
 }
 
 /// Extensions that we read, or that change nothing we look at.
-const SUPPORTED: [&str; 24] = [
+const SUPPORTED: [&str; 25] = [
     "EXT_mesh_features",
+    "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression",
     "EXT_structural_metadata",
     "KHR_animation_pointer",
@@ -137,7 +162,6 @@ pub(super) fn unsupported(document: &Document) -> Vec<GltfProblem> {
     let problem = |(i, name): (usize, &str)| {
         let words = match name {
             "KHR_draco_mesh_compression" => "geometry compressed by Draco",
-            "EXT_mesh_gpu_instancing" => "instances in a table",
             "KHR_meshopt_compression" => "geometry compressed by a newer meshoptimizer",
             "KHR_gaussian_splatting" => "Gaussian splats in place of triangles",
             "MPEG_buffer_circular" | "MPEG_accessor_timed" | "MPEG_media" => "streamed media",
@@ -163,6 +187,9 @@ struct Primitives {
     volume: Option<f64>,
 }
 
+/// Corners of meshes that nodes may show, each as often as it is shown.
+const MAX_PLACED: usize = 1 << 31;
+
 struct Builder<'a> {
     document: &'a Document,
     notes: Notes,
@@ -172,6 +199,12 @@ struct Builder<'a> {
     read: Vec<Option<Primitives>>,
     triangles: usize,
     assumed_material: Option<usize>,
+    /// What is taken off all coordinates.
+    offset: DVec3,
+    /// Nodes that their file hides, the first by its name.
+    hidden: (usize, String),
+    /// Corners of instances that were looked at.
+    instanced: usize,
 }
 
 /// A node on its way: where it is, how deep, and what its parent is.
@@ -187,21 +220,36 @@ impl<'a> Builder<'a> {
     fn new(document: &'a Document, notes: Notes) -> Self {
         let read = vec![None; document.root.list("meshes").len()];
         let (model, members) = (Model::default(), Members::default());
-        Self { document, notes, model, members, read, triangles: 0, assumed_material: None }
+        Self {
+            document,
+            notes,
+            model,
+            members,
+            read,
+            triangles: 0,
+            assumed_material: None,
+            offset: DVec3::ZERO,
+            hidden: (0, String::new()),
+            instanced: 0,
+        }
     }
 
-    fn build(mut self, job: &Job) -> Result<Model, Stop> {
+    fn build(mut self, near: Option<f64>, job: &Job) -> Result<(Model, DVec3), Stop> {
         self.check_totals()?;
         (self.model.materials, self.model.textures) =
             material::materials(self.document, &mut self.notes, job)?;
         let properties =
             Properties::beside(&self.document.path, &self.document.access, &mut self.notes);
-        self.nodes(&properties, job)?;
+        let roots = self.roots();
+        if let Some(metres) = near {
+            self.offset = near::offset(&self.document.root, &roots, metres);
+        }
+        self.nodes(roots, &properties, job)?;
         self.model.members =
             std::mem::take(&mut self.members).finish(&mut self.model.objects, &mut self.notes);
-        self.look_it_over();
+        self.look_it_over(near.unwrap_or(1.0));
         self.model.warnings = self.notes.finish();
-        Ok(self.model)
+        Ok((self.model, self.offset))
     }
 
     /// Refuses too many triangles before any is read.
@@ -254,11 +302,12 @@ impl<'a> Builder<'a> {
         }
     }
 
-    fn nodes(&mut self, properties: &Properties, job: &Job) -> Result<(), Stop> {
+    fn nodes(&mut self, roots: Vec<usize>, properties: &Properties, job: &Job) -> Result<(), Stop> {
         let nodes = self.document.root.list("nodes");
         let mut visited = vec![false; nodes.len()];
-        let visit = |node| Visit { node, depth: 1, parent: DMat4::IDENTITY, standing: None };
-        let mut open: Vec<Visit> = self.roots().into_iter().rev().map(visit).collect();
+        let parent = DMat4::from_translation(-self.offset);
+        let visit = |node| Visit { node, depth: 1, parent, standing: None };
+        let mut open: Vec<Visit> = roots.into_iter().rev().map(visit).collect();
         let mut done = 0;
         while let Some(Visit { node, depth, parent, standing }) = open.pop() {
             done += 1;
@@ -295,8 +344,21 @@ impl<'a> Builder<'a> {
                 .into());
             }
             let name = self.node_name(json, node);
+            if json.extension("KHR_node_visibility").is_some_and(|e| e.field("visible") == false) {
+                if self.hidden.0 == 0 {
+                    self.hidden.1.clone_from(&name);
+                }
+                self.hidden.0 += 1;
+                continue;
+            }
+            let mut own = None;
             let standing = match member::standing(json, &name, properties, &mut self.notes) {
-                Standing::Member(identity) => Some(self.enter(&identity)),
+                Standing::Member(identity) => {
+                    let identity = identity.moved(self.offset.as_vec3());
+                    let entered = self.enter(&identity);
+                    own = Some(identity);
+                    Some(entered)
+                }
                 Standing::Void => {
                     self.notes.once("spaces, openings and the like (IfcSpace, IfcOpeningElement) are no bodies and were left out");
                     continue;
@@ -306,14 +368,24 @@ impl<'a> Builder<'a> {
             self.furnish(json, &name, &world);
             let first = self.model.objects.len();
             if let Some(mesh) = json.index("mesh") {
-                self.place(mesh, &name, &world, standing, job).map_err(|stop| match stop {
-                    Stop::Damaged(p) => Stop::Damaged(if p.code == "NODE_TRANSFORM" {
-                        p.under(&format!("/nodes/{node}"))
-                    } else {
-                        p
+                let here = |stop| match stop {
+                    Stop::Damaged(p) => Stop::Damaged(match p.code {
+                        "NODE_TRANSFORM" | "TOO_BIG" => p.under(&format!("/nodes/{node}")),
+                        _ => p,
                     }),
                     stop => stop,
-                })?;
+                };
+                let instances = match json.extension("EXT_mesh_gpu_instancing") {
+                    Some(table) => geometry::instances(self.document, table, job).map_err(here)?,
+                    None => vec![DMat4::IDENTITY],
+                };
+                for (k, instance) in instances.iter().enumerate() {
+                    let standing = match &own {
+                        Some(identity) if k > 0 => Some(self.enter(&identity.again())),
+                        _ => standing,
+                    };
+                    self.place(mesh, &name, &(world * *instance), standing, job).map_err(here)?;
+                }
             }
             self.steel(json, first);
             let child = |node| Visit { node, depth: depth + 1, parent: world, standing };
@@ -341,7 +413,10 @@ impl<'a> Builder<'a> {
             return;
         };
         match steel::read(said, object.part) {
-            Some(line) => self.model.steel.push((first, line)),
+            Some(mut line) => {
+                line.line.iter_mut().for_each(|p| *p -= self.offset.as_vec3());
+                self.model.steel.push((first, line));
+            }
             None => self.notes.once("a line of steel is damaged and was left out"),
         }
     }
@@ -386,6 +461,13 @@ impl<'a> Builder<'a> {
             return Ok(());
         }
         let (transform, mut extent) = (world.as_mat4(), [Vec3::INFINITY, Vec3::NEG_INFINITY]);
+        job.step(8, 10)?;
+        let corners = list.iter().filter_map(|(mesh, _)| self.model.meshes.get(*mesh));
+        self.instanced += corners.map(|mesh| mesh.positions.len()).sum::<usize>() + 1;
+        if self.instanced > MAX_PLACED {
+            let message = format!("instances have more than {} million corners", MAX_PLACED >> 20);
+            return Err(GltfProblem::error("", "TOO_BIG", message, SMALLER).into());
+        }
         let (member, part) =
             standing.map_or((None, Part::Scenery), |(member, part)| (Some(member), part));
         for &(mesh, material) in &list {
@@ -492,7 +574,13 @@ impl<'a> Builder<'a> {
     }
 
     /// Remarks on the whole: emptiness, size, place, members.
-    fn look_it_over(&mut self) {
+    fn look_it_over(&mut self, metres: f64) {
+        if self.hidden.0 > 0 {
+            let (count, first) = &self.hidden;
+            self.notes.push(format!(
+                "{count} nodes, {first:?} the first, are hidden by KHR_node_visibility: they and what is below them are left out; show them in the model if they are part of it"
+            ));
+        }
         if self.model.objects.is_empty() {
             let loose = !self.document.root.list("meshes").is_empty();
             self.notes.push(
@@ -507,7 +595,7 @@ impl<'a> Builder<'a> {
         }
         if self.model.members.is_empty() {
             self.notes.push(
-                "no structural members: name nodes COL_…, BEAM_…, SLAB_…, WALL_…, FOOTING_…, LINING_… or SEGMENT_…, give them extras.intrados, or put a .props.json beside the file".into(),
+                format!("{NO_MEMBERS}: name nodes COL_…, BEAM_…, SLAB_…, WALL_…, FOOTING_…, LINING_… or SEGMENT_…, give them extras.intrados, or put a .props.json beside the file"),
             );
         }
         let mut bounds = [Vec3::INFINITY, Vec3::NEG_INFINITY];
@@ -521,10 +609,13 @@ impl<'a> Builder<'a> {
             self.notes.push(format!("the model is {size} m large: {NO_UNIT}"));
         }
         let far = bounds[0].abs().max(bounds[1].abs()).max_element();
-        if far > 1e5 {
-            self.notes
-                .push(format!("the model lies {far:.0} m from the origin, where single precision resolves only centimetres: move it"));
+        if far > 1e4 {
+            let resolved = 1e3 * f32::EPSILON * far;
+            self.notes.push(format!(
+                "the model lies {far:.0} m from the origin, where single precision resolves {resolved:.0} mm: move it, or import it (`intrados import`), which does"
+            ));
         }
+        self.note_coarse(metres);
         // A camera looks at something: the point of its axis nearest to the middle of the model.
         let middle = 0.5 * (bounds[0] + bounds[1]);
         for camera in &mut self.model.cameras {
@@ -534,6 +625,40 @@ impl<'a> Builder<'a> {
         }
     }
 }
+
+impl Builder<'_> {
+    /// Notes corners that lie so far from the origin of their own node that single precision, in
+    /// which files keep them, has lost millimetres of them.
+    fn note_coarse(&mut self, metres: f64) {
+        let reach = |mesh: &Arc<Mesh>| {
+            mesh.positions.iter().map(|p| p.abs().max_element()).fold(0.0, f32::max)
+        };
+        let far: Vec<f32> = self.model.meshes.iter().map(reach).collect();
+        let (mut coarse, mut worst) = (0, 0.0);
+        for object in &self.model.objects {
+            let matrix = &object.transform;
+            let scale = [matrix.x_axis, matrix.y_axis, matrix.z_axis]
+                .map(|axis| axis.truncate().length())
+                .into_iter()
+                .fold(0.0, f32::max);
+            let far = far.get(object.mesh).copied().unwrap_or(0.0);
+            let lost = metres * f64::from(f32::EPSILON * far * scale);
+            if lost > COARSE {
+                coarse += 1;
+                worst = lost.max(worst);
+            }
+        }
+        if coarse > 0 {
+            self.notes.push(format!(
+                "corners of {coarse} surfaces lie so far from the origin of their own node that the file keeps them to {:.0} mm only: sections and spacings are as rough; export the model near its origin and give the distance to a node above",
+                1e3 * worst
+            ));
+        }
+    }
+}
+
+/// What a corner's coordinate may lose in its file before that is noted, m.
+const COARSE: f64 = 1e-3;
 
 fn extent_of(mesh: &Mesh, transform: &Mat4) -> [Vec3; 2] {
     mesh.positions.iter().fold([Vec3::INFINITY, Vec3::NEG_INFINITY], |[low, high], &p| {

@@ -356,6 +356,7 @@ const ANISOTROPY: &[Property] = &[
 const EXTENSIONS: &[(&str, &str, &[Property])] = &[
     ("KHR_lights_punctual", "extensions", LIGHTS),
     ("KHR_lights_punctual", "nodes", &[Property("light", Light, true)]),
+    ("EXT_mesh_gpu_instancing", "nodes", &[Property("attributes", Attributes, true)]),
     ("KHR_node_visibility", "nodes", &[Property("visible", Bool, false)]),
     ("EXT_meshopt_compression", "bufferViews", PACKED_VIEW),
     ("EXT_meshopt_compression", "buffers", &[Property("fallback", Bool, false)]),
