@@ -207,14 +207,13 @@ fn corners(
 ) -> Result<Outcome, Failure> {
     let index = index_of(scene, member)?;
     let outline = site.surface(index).map(intrados_photo::face::Surface::outline);
-    let corners = outline.unwrap_or_default().corners;
-    let faces = site.surface(index).map(|s| corners.iter().map(|c| s.faces_at(*c)).collect());
+    let intrados_photo::corner::Outline { corners, names, .. } = outline.unwrap_or_default();
     let report = Corners {
         schema: "intrados.corners/1",
         scene: scene.name.clone(),
         member: scene.members[index].id.clone(),
         corners: corners.iter().map(DVec3::to_array).collect(),
-        faces: faces.unwrap_or_default(),
+        faces: names,
     };
     session.print(&report, || {
         let mut rows = vec![["corner", "x m", "y m", "z m", "faces"].map(String::from).to_vec()];

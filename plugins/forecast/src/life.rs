@@ -387,7 +387,7 @@ fn is_loaded(scene: &Scene, model: &str) -> bool {
     let acts = |members: &[String]| {
         members.is_empty() || members.iter().any(|id| assembly.members.contains(id))
     };
-    let of_frame = structure.bears_as_one();
+    let of_frame = scene.bears_as_one();
     structure.loads.iter().any(|load| of_frame || acts(&load.members))
 }
 

@@ -154,21 +154,6 @@ impl Surface {
         self.faces.iter().position(is_own)
     }
 
-    /// Names of the flat faces on which a corner of the outline lies: which corner it is of a section
-    /// that looks the same all around.
-    #[must_use]
-    pub fn faces_at(&self, corner: DVec3) -> Vec<String> {
-        let corners = self.outline().corners;
-        let is_on = |face: &&Face| match face.chart {
-            Chart::Flat(n) => {
-                let most = corners.iter().map(|c| c.dot(n)).fold(f64::NEG_INFINITY, f64::max);
-                most - corner.dot(n) < 1e-3 * self.length()
-            }
-            Chart::Around(_) | Chart::Inside(_) => false,
-        };
-        self.faces.iter().filter(is_on).map(|face| face.name.clone()).collect()
-    }
-
     fn is_side(&self, normal: DVec3) -> bool {
         normal.dot(self.axis).abs() < OWN
     }
