@@ -16,8 +16,8 @@ use crate::{
     weighed::Said,
 };
 
-/// Odds of rounding.
-const ROUNDING: f64 = 1e-9;
+/// What falls by less is alike.
+const ROUNDING: f64 = 1e-6;
 
 fn site(class: &str, cover: f64, is_steel_assumed: bool) -> Site {
     let bars = Bars { weight: 1.0, cover: cover + 0.008, diameter: 0.016 };

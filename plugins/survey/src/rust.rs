@@ -179,14 +179,27 @@ impl Weighed {
                 Some(moved) => Arc::new(moved),
                 None => Arc::clone(&draws),
             };
-            let mut logs = vec![0.0; own.len()];
-            for cell in &gathered {
-                cell.add(&own, site.heard(cell.zones, zone, reach), &mut logs, job)?;
-            }
             let priors: Vec<f64> = own.iter().map(|draw| draw.prior).collect();
-            let (weights, power) = weights(&logs, &priors);
+            let weights_of = |cracks: CracksAs| -> Result<(Vec<f64>, f64), Cancelled> {
+                let mut logs = vec![0.0; own.len()];
+                for cell in &gathered {
+                    let power = site.heard(cell.zones, zone, reach);
+                    cell.add(&own, power, cracks, &mut logs, job)?;
+                }
+                Ok(weights(&logs, &priors))
+            };
+            let (weights, power) = weights_of(CracksAs::Read)?;
             weighed.power = weighed.power.min(power);
-            let (lost, active) = posterior(&own, &weights, &site.bars[zone], site.age);
+            let (mut lost, active) = posterior(&own, &weights, &site.bars[zone], site.age);
+            if gathered.iter().any(GatheredCell::has_cracks) {
+                // A somewhat wider crack speaks for some rust against much of it, which other causes
+                // may have opened: it must not say that less is lost than a hairline does.
+                let (weights, _) = weights_of(CracksAs::Hairlines)?;
+                let (least, _) = posterior(&own, &weights, &site.bars[zone], site.age);
+                if least.value > lost.value {
+                    lost = least;
+                }
+            }
             weighed.found[zone] = Some(ZonePosterior { draws: own, weights, lost, active });
         }
         weighed.surprises = measured.surprises;
@@ -334,6 +347,18 @@ impl HalfCells {
     }
 }
 
+/// How cracks along bars count.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum CracksAs {
+    /// As wide as they were read.
+    Read,
+    /// As the finest that can be read.
+    Hairlines,
+}
+
+/// The finest crack that can be read, mm.
+const HAIRLINE: f64 = 0.01;
+
 /// A finding, or several that are alike.
 struct Sight {
     shows: Shows,
@@ -388,11 +413,16 @@ impl GatheredCell {
         Some(Self { zones: cell.zones, bars, half_cells: HalfCells::of(potentials), sights })
     }
 
+    fn has_cracks(&self) -> bool {
+        self.sights.iter().any(|sight| matches!(sight.shows, Shows::Crack { .. }))
+    }
+
     /// Adds what its readings say of each state, heard with some power.
     fn add(
         &self,
         draws: &[Possible],
         power: f64,
+        cracks: CracksAs,
         logs: &mut [f64],
         job: &Job,
     ) -> Result<(), Cancelled> {
@@ -413,7 +443,7 @@ impl GatheredCell {
             let widest = widest_explained(&states);
             for sight in sights {
                 job.check()?;
-                let likelihood = likelihood_of(&sight.shows, widest);
+                let likelihood = likelihood_of(&sight.shows, cracks, widest);
                 for (log, (width, active)) in logs.iter_mut().zip(&states) {
                     *log += power * sight.share * likelihood(*width, *active).max(1e-300).ln();
                 }
@@ -467,10 +497,14 @@ fn widest_explained(states: &[(f64, bool)]) -> f64 {
 }
 
 /// The likelihood of a finding where rust has opened a crack of a width (mm), and where bars rust.
-fn likelihood_of(shows: &Shows, widest: f64) -> Box<dyn Fn(f64, bool) -> f64> {
+fn likelihood_of(shows: &Shows, cracks: CracksAs, widest: f64) -> Box<dyn Fn(f64, bool) -> f64> {
     match *shows {
         Shows::Crack { width_mm, std_error_mm, .. } => {
             let crack = CrackReading::new(width_mm, std_error_mm, widest);
+            let crack = match cracks {
+                CracksAs::Read => crack,
+                CracksAs::Hairlines => CrackReading { width: HAIRLINE, spread: WIDTH_SPREAD },
+            };
             Box::new(move |width, _| crack.likelihood(width))
         }
         Shows::Intact { seen, limit_mm } => Box::new(move |width, _| {
@@ -510,42 +544,33 @@ const OTHER_WIDTH: f64 = 0.15;
 /// both: the wider a crack, the less another cause explains it, at every width.
 const WIDTH_SPREAD: f64 = 0.7;
 
+/// Width to which the error of a reading is relative at least, mm: relative to a fine crack it would
+/// make it say nothing, and a somewhat wider one speak for other causes.
+const ERROR_WIDTH: f64 = 1.0;
+
 /// A crack along bars, as it was read.
 struct CrackReading {
-    /// Widths (mm) that it may truly have, and their weights.
-    widths: Vec<[f64; 2]>,
+    /// mm.
+    width: f64,
+    /// Deviation of the logarithm of a width, by what opens cracks and by the reading.
+    spread: f64,
 }
 
 impl CrackReading {
     /// `widest`: what is read beyond that speaks for no more.
     fn new(width: f64, error: f64, widest: f64) -> Self {
-        const NODES: i32 = 6;
-        let read = width.clamp(0.01, widest.max(0.01));
-        let error = error * (read / width.max(0.01)).min(1.0);
-        let node = |k: i32| {
-            let z = 2.4 * f64::from(k) / f64::from(NODES);
-            let weight = (-0.5 * z * z).exp();
-            [(read + z * error).clamp(0.01, widest), weight]
-        };
-        let widths = match error > 0.0 {
-            true => (-NODES..=NODES).map(node).collect(),
-            false => vec![[read, 1.0]],
-        };
-        Self { widths }
+        let spread = WIDTH_SPREAD.hypot(error / width.max(ERROR_WIDTH));
+        Self { width: width.clamp(HAIRLINE, widest.max(HAIRLINE)), spread }
     }
 
     /// Where rust has opened a crack of `rust` mm.
     fn likelihood(&self, rust: f64) -> f64 {
-        let density = |width: f64, about: f64| {
-            let z = (width / about).ln() / WIDTH_SPREAD;
-            (-0.5 * z * z).exp() / (WIDTH_SPREAD * width * 2.506_628)
+        let density = |about: f64| {
+            let z = (self.width / about).ln() / self.spread;
+            (-0.5 * z * z).exp() / (self.spread * self.width * 2.506_628)
         };
-        let opens = half_at(rust, 0.15, 0.4);
-        let one = |[width, weight]: &[f64; 2]| {
-            let of_rust = opens * density(*width, rust.max(OTHER_WIDTH));
-            weight * (of_rust + OTHER_CAUSES * density(*width, OTHER_WIDTH))
-        };
-        self.widths.iter().map(one).sum()
+        let of_rust = half_at(rust, 0.15, 0.4) * density(rust.max(OTHER_WIDTH));
+        of_rust + OTHER_CAUSES * density(OTHER_WIDTH)
     }
 }
 
