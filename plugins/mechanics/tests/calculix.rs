@@ -4,8 +4,8 @@
 //! cargo test --release -p intrados-mechanics --test calculix -- --ignored --nocapture --test-threads 1
 //! ```
 //!
-//! `CCX` names the program, else `ccx` is looked for; without it the comparison is skipped, and
-//! says so. Costs are those of whole runs, from reading the deck to the written result, each in a
+//! `CCX` names the program, else `ccx` is looked for (Debian: `apt-get install calculix-ccx`, 2.20);
+//! without it the comparison fails. Costs are those of whole runs, from reading the deck to the written result, each in a
 //! process of its own, one after the other: CPU-seconds of all threads, and the largest resident
 //! memory. They are read from `/proc` and known on Linux only.
 
@@ -119,15 +119,13 @@ fn cube(n: usize) -> String {
     text + &load + OUTPUT
 }
 
-fn ccx() -> Option<PathBuf> {
+/// CalculiX: a comparison without its peer is no comparison.
+fn ccx() -> PathBuf {
     let named = std::env::var_os("CCX").map(PathBuf::from);
     let path = std::env::var_os("PATH").unwrap_or_default();
-    let found =
-        named.or_else(|| std::env::split_paths(&path).map(|p| p.join("ccx")).find(|p| p.is_file()));
-    if found.is_none() {
-        eprintln!("skipped: no ccx (CalculiX) in PATH; name it by CCX");
-    }
-    found
+    named
+        .or_else(|| std::env::split_paths(&path).map(|p| p.join("ccx")).find(|p| p.is_file()))
+        .expect("CalculiX: `apt-get install calculix-ccx`, or name ccx by CCX")
 }
 
 /// Waits for a process and watches what it takes.
@@ -264,9 +262,9 @@ fn compare(ccx: &Path, size: Size) -> (f64, Cost, Cost) {
 }
 
 #[test]
-#[ignore = "runs CalculiX for a minute"]
+#[ignore = "needs CalculiX (apt: calculix-ccx), which runs for a minute"]
 fn answers_as_calculix_to_six_digits() {
-    let Some(ccx) = ccx() else { return };
+    let ccx = ccx();
     for size in [[20, 40, 11], [28, 56, 21]] {
         let (off, ..) = compare(&ccx, size);
         // Half a unit of the sixth digit, at most 5e-6 of the number.
@@ -275,9 +273,9 @@ fn answers_as_calculix_to_six_digits() {
 }
 
 #[test]
-#[ignore = "runs CalculiX for some minutes"]
+#[ignore = "needs CalculiX (apt: calculix-ccx), which runs for some minutes"]
 fn costs_an_eighth_of_the_time_and_a_quarter_of_the_memory_at_199_260_unknowns() {
-    let Some(ccx) = ccx() else { return };
+    let ccx = ccx();
     let (off, our, their) = compare(&ccx, [40, 80, 19]);
     assert!(off < 5e-6, "{off}");
     eprintln!("CPU 1/{:.1}, memory 1/{:.1}", their.cpu / our.cpu, their.megabytes / our.megabytes);

@@ -290,18 +290,32 @@ fn cracked(bond: &str, element: f64) -> Outcome {
     analyze(&prepared, MarchSettings::of_life(), &Job::default(), &mut ()).unwrap().0
 }
 
-/// A beam whose cracks are grown sags between what EN 1992-1-1 says by its deflections (7.18, β = 1:
-/// 2.70 mm under 15 kN/m) and by the least mean strain of its cracks (7.9: .6 of the 3.09 mm of a
-/// section without tension), whatever the bricks.
+/// Size of bricks, m, and what the beam sagged by when it was last run (28 November 2026), mm. All
+/// miss the bound.
+const SAGS: [(f64, f64); 3] = [(0.15, 2.12), (0.1, 2.29), (0.075, 2.20)];
+
+/// A beam whose cracks are grown ought to sag as EN 1992-1-1 (7.18) says for a first load (β = 1),
+/// 2.70 mm under 15 kN/m, within 15 %: the bound that was written before the test first ran. **Every
+/// mesh misses it**, by 21, 15.3 and 19 %, since concrete between cracks bears more in ours than
+/// (7.18) has it bear; a mesh that reaches it fails here, so that the list is changed. None sags by
+/// less than the least mean strain of its cracks says (7.9: .6 of the 3.09 mm of a section without
+/// tension), and none by more than (7.18): both are the code's.
 #[test]
-fn a_cracked_beam_sags_as_the_code_says() {
-    let sags = [0.15, 0.1, 0.075, 0.05].map(|element| {
+fn a_cracked_beam_sags_between_both_formulas_of_the_code_and_misses_one() {
+    let sag = |element: f64| {
         let outcome = cracked("Perfect", element);
         let sag = 1e3 * outcome.steps.last().unwrap().max_displacement_m;
         println!("{element} m: {sag:.2} mm");
+        assert!((0.6 * 3.09..=2.70).contains(&sag), "{element} m: {sag} mm");
         sag
-    });
-    assert!(sags.iter().all(|sag| (0.6 * 3.09..=2.70).contains(sag)), "{sags:?}");
+    };
+    for (element, recorded) in SAGS {
+        let sag = sag(element);
+        assert!((sag / recorded - 1.0).abs() < 0.02, "{element} m: {sag} mm, recorded {recorded}");
+        assert!((sag / 2.70 - 1.0).abs() >= 0.15, "{element} m: {sag} mm reaches 2.70 ± 15 %");
+    }
+    // Of the finest mesh no value is recorded by today's law.
+    sag(0.05);
 }
 
 /// Bars that may slip converge like bars that may not, and the beam deflects as much: bond is stiff

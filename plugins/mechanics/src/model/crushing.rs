@@ -101,16 +101,22 @@ mod tests {
         model::{Action, Body, Control, Drive, Load, March, MarchSettings, Matter, Model},
     };
 
+    /// Size of bricks, m, the share of the crushing energy that one took when it was last run (28
+    /// November 2026), and whether that misses the bound.
+    const SHARES: [(f64, f64, bool); 3] =
+        [(0.03, 0.778, true), (0.06, 0.818, false), (0.1, 0.862, false)];
+
     /// A prism of .6 m, one brick of which is a little weaker, pressed until that is crushed: it
-    /// takes the crushing energy or, small, four fifths of it, since it does not crush alone from
-    /// the first.
+    /// takes the crushing energy within 20 %, the bound that was written before the test first ran,
+    /// since it does not crush alone from the first. **A brick of 30 mm misses it** by 2 %. (By the
+    /// curve of 200 mm it would take h/200 mm of that energy, .15 in the smallest.)
     #[test]
     fn a_brick_that_crushes_alone_takes_the_crushing_energy() {
         let given = Given { fcm: Some(38e6), poisson: Some(0.0), ..Given::default() };
         let concrete = given.complete().unwrap();
         let (strength, energy, peak) =
             (concrete.fcm, concrete.crushing_energy, concrete.peak_strain);
-        for h in [0.03, 0.06, 0.1] {
+        for (h, recorded, misses) in SHARES {
             let mesh = block(&divide(0.0, 0.6, &[], h), &[0.0, h], &[0.0, h], "prism").unwrap();
             let middle = mesh.hexes.len() / 2;
             let setting = Setting { cracks: Cracks::Planes, ..Setting::short_term(h) };
@@ -163,9 +169,9 @@ mod tests {
             let taken = work + 0.5 * most * strength * peak * h;
             println!("{h} m: {most:.3} f_c, {taken:.0} of {energy:.0} N/m, {shortened:.2e} m");
             assert!((most - 0.97).abs() < 0.01, "{h}: {most}");
-            // By the curve of 200 mm it would be h/200 mm of that, .15 in the smallest.
             let share = taken / energy;
-            assert!((0.7..1.05).contains(&share), "{h}: {taken} of {energy}");
+            assert!((share / recorded - 1.0).abs() < 0.02, "{h}: {share}, recorded {recorded}");
+            assert_eq!((share - 1.0).abs() >= 0.2, misses, "{h}: {taken} of {energy}");
         }
     }
 }
