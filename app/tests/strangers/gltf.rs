@@ -63,7 +63,7 @@ fn every_file_of_the_folder_with_data() {
                 ("COL_1", [4.0, 0.38, 0.39, 0.586]),
                 ("COL_2", [4.0, 0.38, 0.41, 0.609]),
             ],
-            &["the file keeps them to 55 mm only"],
+            &["the file keeps them to 31 mm only"],
         ),
         ("mm_no_scale.gltf", &[], &[], &["4.0 km long", "--unit mm"]),
         ("mm_no_scale.gltf", &["--unit", "mm"], one, QUIET),

@@ -112,7 +112,7 @@ fn every_file_of_the_folder_with_data() {
         ("plain.obj", &[], frame, QUIET),
         ("bom.obj", &[], column, QUIET),
         ("colours.obj", &[], column, QUIET),
-        ("comma.obj", &[], column, &["12 numbers have a comma"]),
+        ("comma.obj", &[], column, &["8 numbers have a comma"]),
         ("concave_L.obj", &[], &[("Beam_L", [6.0, 0.8, 0.6, 1.44])], QUIET),
         ("concave_portal.obj", &[], portal, QUIET),
         ("concave_portal_triangles.obj", &[], portal, QUIET),
@@ -196,7 +196,9 @@ fn prism(name: &str, outline: &[[f64; 2]], depth: f64) -> String {
     let n = outline.len();
     let mut text = format!("o {name}\n");
     for z in [0.0, depth] {
-        outline.iter().for_each(|[x, y]| drop(writeln!(text, "v {x} {y} {z}")));
+        for [x, y] in outline {
+            let _ = writeln!(text, "v {x} {y} {z}");
+        }
     }
     let numbers = |all: &mut dyn Iterator<Item = usize>| {
         all.map(|i| i.to_string()).collect::<Vec<_>>().join(" ")
@@ -320,7 +322,7 @@ fn relatives_of_the_folder() {
     }
     for (name, bytes, words) in [
         ("wide", plain.encode_utf16().flat_map(u16::to_le_bytes).collect(), vec!["is not text"]),
-        ("far", plain.replace("f 2 3", "f 2 33").into_bytes(), vec![":16:1", "no vertex 33"]),
+        ("far", plain.replace("f 2 3", "f 2 33").into_bytes(), vec![":13:1", "no vertex 33"]),
         (
             "nan",
             plain.replace("v 0.4 0 0\n", "v nan 0 0\n").into_bytes(),
@@ -335,12 +337,12 @@ fn relatives_of_the_folder() {
     }
 }
 
-/// A floor outline of 20 000 corners, half of them notches.
+/// An outline of 4000 corners, half of them of notches.
 #[test]
 fn a_face_of_many_corners_is_cut() {
     let place = tempfile::tempdir().unwrap();
     let path = place.path().join("many.obj");
-    let n = 5000;
+    let n = 1000;
     let teeth = (0..n).flat_map(|k| {
         let x = 40.0 * f64::from(k) / f64::from(n);
         let half = 20.0 / f64::from(n);

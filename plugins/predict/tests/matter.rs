@@ -34,18 +34,10 @@ fn of_wood(line: f64) -> (Forecast, Prediction) {
         "    loads: [(name: \"line\", members: [\"{id}\"], action: Line(force_kn_m: (0, -{line}, 0))),\n"
     );
     let text = text.replacen("concrete: ", wood, 1).replacen("    loads: [\n", &load, 1);
-    // No bars, and bearings that let it turn.
+    // No bars; what import assumes are bearings that let it turn.
     let (before, rest) = text.split_once("reinforcement: ").unwrap();
     let text = format!("{before}{}", rest.split_once("\n").unwrap().1.trim_start());
     let text = text
-        .replace(
-            "Surface(from: 0, to: 0.1, side_deg: 180)",
-            "Surface(from: 0, to: 0, side_deg: 180)",
-        )
-        .replace(
-            "Surface(from: 0.9, to: 1, side_deg: 180)",
-            "Surface(from: 1, to: 1, side_deg: 180)",
-        )
         .replace("assumed: [Concrete, Exposure, Age, Reinforcement]", "assumed: [Exposure, Age]");
     assert!(text.contains(wood) && text.contains("\"line\""), "{text}");
     std::fs::write(&file, text).unwrap();

@@ -24,15 +24,36 @@ const ROUNDS: usize = 20;
 pub(super) fn close(surface: &mut Surface) -> bool {
     let [low, high] = surface.bounds();
     let most = LEAST * (high - low).min_element();
+    let mut best: Option<(usize, f64, Surface)> = None;
     for same in SAME.into_iter().filter(|same| *same == SAME[0] || *same < most) {
-        let mut closed = surface.clone();
-        if closed_within(&mut closed, same) {
-            *surface = closed;
-            return true;
+        let mut joined = surface.clone();
+        weld(&mut joined, same);
+        undouble(&mut joined);
+        let mut open = open_edges(&joined).len();
+        if open > 0 {
+            orient(&mut joined);
+            open = open_edges(&joined).len();
+        }
+        if best.as_ref().is_none_or(|(least, ..)| open < *least) {
+            best = Some((open, same, joined));
+        }
+        if open == 0 {
+            break;
         }
     }
-    // What is left open is at least tidy.
-    closed_within(surface, SAME[0])
+    let Some((open, same, joined)) = best else { return false };
+    *surface = joined;
+    if open == 0 {
+        outward(surface);
+        return true;
+    }
+    for _ in 0..ROUNDS {
+        if !split(surface, same) {
+            break;
+        }
+    }
+    fill(surface);
+    open_edges(surface).is_empty()
 }
 
 /// Whether a surface is closed as it is, each face once.
@@ -42,23 +63,6 @@ pub(super) fn is_closed(surface: &Surface) -> bool {
     let count = welded.triangles.len();
     undouble(&mut welded);
     welded.triangles.len() == count && open_edges(&welded).is_empty()
-}
-
-fn closed_within(surface: &mut Surface, same: f64) -> bool {
-    weld(surface, same);
-    undouble(surface);
-    if open_edges(surface).is_empty() {
-        outward(surface);
-        return true;
-    }
-    orient(surface);
-    for _ in 0..ROUNDS {
-        if !split(surface, same) {
-            break;
-        }
-    }
-    fill(surface);
-    open_edges(surface).is_empty()
 }
 
 /// Turns a closed surface round that looks inward all over.

@@ -137,10 +137,12 @@ fn unit(format: &str, members: &[Body]) -> Option<String> {
         use MemberKind::{Bar, Lining, Pipe, Segment, Tendon};
         !matches!(m.kind, Bar | Lining | Pipe | Segment | Tendon)
     };
-    let limit = |m: &Body| match m.is_flat() && (PLATE[0]..=PLATE[1]).contains(&m.size[0]) {
-        true => LONG_PLATE,
-        false => LONG,
+    let is_plate = |m: &Body| {
+        matches!(m.kind, MemberKind::Slab | MemberKind::Wall)
+            && m.is_flat()
+            && (PLATE[0]..=PLATE[1]).contains(&m.size[0])
     };
+    let limit = |m: &Body| if is_plate(m) { LONG_PLATE } else { LONG };
     let all: Vec<&Body> = members.iter().filter(solid).collect();
     let longest = all.iter().max_by(|a, b| a.size[2].total_cmp(&b.size[2]))?;
     let says = if format == "glTF" { "glTF is in metres" } else { "OBJ says no unit" };

@@ -330,37 +330,3 @@ fn measure(
         format!("the model is {size:.4} m across: mm or m? say it, with --unit mm or --unit m"),
     ))
 }
-
-#[cfg(test)]
-mod scratch {
-    #[test]
-    fn scratch_print_all() {
-        let Some(folder) = std::env::var_os("SCRATCH") else { return };
-        let mut files: Vec<_> =
-            std::fs::read_dir(folder).unwrap().map(|f| f.unwrap().path()).collect();
-        files.sort();
-        for path in files {
-            let out = tempfile::tempdir().unwrap();
-            let told = super::Told::default();
-            let found = super::import(
-                &path,
-                &out.path().join("o"),
-                &told,
-                &Default::default(),
-                &Default::default(),
-            );
-            println!("=== {}", path.file_name().unwrap().to_string_lossy());
-            match found {
-                Err(e) => println!("   REFUSED {e}"),
-                Ok(found) => {
-                    let text = std::fs::read_to_string(out.path().join("o/scene.ron")).unwrap();
-                    for l in text.lines().filter(|l| l.contains("m across")) {
-                        println!("   {}", l.trim());
-                    }
-                    println!("   offset {:?}", found.offset_m);
-                    found.notes.iter().for_each(|n| println!("   - {n}"));
-                }
-            }
-        }
-    }
-}

@@ -78,3 +78,86 @@ fn given(scene: &Scene, member: &crate::Member) -> f64 {
     })
     .sum()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two columns of 3 m under a beam of .3 × .6 × 6.2 m, which weighs 27.9 kN.
+    fn frame(supports: &[(&str, &str)], more: &str) -> Scene {
+        let column = |id: &str, x: f32| {
+            format!(
+                "(id: \"{id}\", at: ({x}, 0, 0), concrete: \"C30/37\", body: Column(section: Rectangle(width_m: 0.4, depth_m: 0.4), height_m: 3))"
+            )
+        };
+        let held = supports
+            .iter()
+            .map(|(member, place)| format!("(member: \"{member}\", place: {place}, hold: Fixed)"));
+        let text = format!(
+            "(schema: \"intrados.scene/1\", members: [{}, {}, (id: \"B\", at: (-0.1, 3.3, 0), concrete: \"C30/37\", body: Beam(section: Rectangle(width_m: 0.3, depth_m: 0.6), length_m: 6.2))], supports: [{}], {more})",
+            column("C1", 0.0),
+            column("C2", 6.0),
+            held.collect::<Vec<_>>().join(", ")
+        );
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("frame.ron");
+        std::fs::write(&path, text).unwrap();
+        Scene::load(&path, &Default::default()).unwrap()
+    }
+
+    const COLUMNS: [(&str, &str); 2] = [("C1", "Start"), ("C2", "Start")];
+    const ALL: [(&str, &str); 4] = [("C1", "Start"), ("C2", "Start"), ("B", "Start"), ("B", "End")];
+    const WEIGHT: &str = "loads: [(name: \"own\", action: SelfWeight)],";
+
+    fn doubt(scene: &Scene) -> Option<&String> {
+        scene.warnings.iter().find(|w| w.contains("bear nothing of what rests on them"))
+    }
+
+    #[test]
+    fn columns_without_what_rests_on_them_are_told() {
+        let scene = frame(&ALL, WEIGHT);
+        let said = doubt(&scene).unwrap();
+        assert!(
+            ["2 columns", "\"C1\"", "\"B\"", "14 kN"].iter().all(|w| said.contains(w)),
+            "{said}"
+        );
+        assert!(!scene.bears_as_one());
+        let joints = "joints: [(of: (\"C1\", \"B\"), kind: Hinge)],";
+        let joined = frame(&ALL, &format!("{WEIGHT} {joints}"));
+        assert!(joined.bears_as_one() && doubt(&joined).is_none());
+    }
+
+    /// What nothing holds is carried by what it touches, and all bear as one: no word that it is held
+    /// by nothing.
+    #[test]
+    fn a_beam_that_nothing_holds_is_carried() {
+        let scene = frame(&COLUMNS, WEIGHT);
+        assert!(scene.bears_as_one());
+        let told = |w: &&String| w.contains("nothing holds it") || w.contains("bear nothing");
+        assert_eq!(scene.warnings.iter().find(told), None);
+        // Nothing holds any of it: nothing bears.
+        assert!(!frame(&[], WEIGHT).bears_as_one());
+    }
+
+    /// From nothing to more than what rests on it: told below half of its share, 7 kN.
+    #[test]
+    fn a_load_by_hand_stands_for_what_rests_on_a_column() {
+        let with = |kn: f32| {
+            let load = |id: &str| {
+                format!(
+                    "(name: \"deck {id}\", members: [\"{id}\"], action: Force(place: End, force_kn: (0, -{kn}, 0)))"
+                )
+            };
+            let loads = format!(
+                "loads: [(name: \"own\", action: SelfWeight), {}, {}],",
+                load("C1"),
+                load("C2")
+            );
+            doubt(&frame(&ALL, &loads)).is_some()
+        };
+        assert_eq!(
+            [0.0, 2.0, 6.0, 8.0, 14.0, 200.0].map(with),
+            [true, true, true, false, false, false]
+        );
+    }
+}

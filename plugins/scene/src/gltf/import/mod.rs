@@ -462,6 +462,7 @@ impl<'a> Builder<'a> {
         }
         let (transform, mut extent) = (world.as_mat4(), [Vec3::INFINITY, Vec3::NEG_INFINITY]);
         job.step(8, 10)?;
+        self.document.spend(list.len().saturating_mul(size_of::<Object>()))?;
         let corners = list.iter().filter_map(|(mesh, _)| self.model.meshes.get(*mesh));
         self.instanced += corners.map(|mesh| mesh.positions.len()).sum::<usize>() + 1;
         if self.instanced > MAX_PLACED {
@@ -642,7 +643,9 @@ impl Builder<'_> {
                 .into_iter()
                 .fold(0.0, f32::max);
             let far = far.get(object.mesh).copied().unwrap_or(0.0);
-            let lost = metres * f64::from(f32::EPSILON * far * scale);
+            // From one number to the next.
+            let step = f32::EPSILON * far.max(f32::MIN_POSITIVE).log2().floor().exp2();
+            let lost = metres * f64::from(step * scale);
             if lost > COARSE {
                 coarse += 1;
                 worst = lost.max(worst);

@@ -22,14 +22,17 @@ pub(super) fn offset(root: &Value, roots: &[usize], metres: f64) -> DVec3 {
     let mut open: Vec<(usize, usize, DMat4)> =
         roots.iter().map(|&n| (n, 1, DMat4::IDENTITY)).collect();
     let mut bounds = [DVec3::INFINITY, DVec3::NEG_INFINITY];
+    // Many nodes may show one mesh of many primitives.
+    let boxes: Vec<Option<[DVec3; 2]>> =
+        root.list("meshes").iter().map(|mesh| box_of(root, mesh)).collect();
     while let Some((node, depth, parent)) = open.pop() {
         let Some((json, seen)) = nodes.get(node).zip(seen.get_mut(node)) else { continue };
         if std::mem::replace(seen, true) || depth > MAX_DEPTH {
             continue;
         }
         let world = parent * local_transform(json);
-        let mesh = json.index("mesh").and_then(|m| root.list("meshes").get(m));
-        for corner in mesh.into_iter().flat_map(|mesh| corners(root, mesh)) {
+        let shown = json.index("mesh").and_then(|m| *boxes.get(m)?);
+        for corner in shown.into_iter().flat_map(corners) {
             let p = world.transform_point3(corner);
             if p.is_finite() {
                 bounds = [bounds[0].min(p), bounds[1].max(p)];
@@ -46,8 +49,8 @@ pub(super) fn offset(root: &Value, roots: &[usize], metres: f64) -> DVec3 {
     }
 }
 
-/// Corners of the boxes of a mesh's primitives, as their accessors state them.
-fn corners(root: &Value, mesh: &Value) -> Vec<DVec3> {
+/// The box of a mesh's primitives, as their accessors state it.
+fn box_of(root: &Value, mesh: &Value) -> Option<[DVec3; 2]> {
     let positions = mesh
         .list("primitives")
         .iter()
@@ -59,11 +62,12 @@ fn corners(root: &Value, mesh: &Value) -> Vec<DVec3> {
         let at = |key| accessor.numbers::<3>(key).map(|p| scale * DVec3::from_array(p));
         Some([at("min")?, at("max")?])
     });
-    let corner = |[low, high]: [DVec3; 2]| {
-        (0..8).map(move |k| {
-            let pick = |i: usize| if k >> i & 1 == 0 { low[i] } else { high[i] };
-            DVec3::new(pick(0), pick(1), pick(2))
-        })
-    };
-    boxes.flat_map(corner).collect()
+    boxes.reduce(|[l, h], [m, n]| [l.min(m), h.max(n)])
+}
+
+fn corners([low, high]: [DVec3; 2]) -> impl Iterator<Item = DVec3> {
+    (0..8).map(move |k| {
+        let pick = |i: usize| if k >> i & 1 == 0 { low[i] } else { high[i] };
+        DVec3::new(pick(0), pick(1), pick(2))
+    })
 }
