@@ -184,6 +184,23 @@ fn hoops(per_metre: f64, most: f64) -> (f32, f32) {
     (diameter as f32, ((100.0 * spacing).floor() * 10.0).max(20.0) as f32)
 }
 
+/// Weight of reinforced concrete, N/m³ (EN 1991-1-1, table A.1).
+const WEIGHT: f64 = 25e3;
+
+/// Area of the bars below that are assumed, and the area that the member's own weight needs between
+/// two supports at its ends, m²: M = ρ g A l² / 8 on .9 d at the yield stress. `None`: they carry
+/// it, or the member does not lie on two supports.
+pub(super) fn own_weight(m: &Measures, r: &Reinforcement) -> Option<[f64; 2]> {
+    let spans = matches!(m.kind, MemberKind::Beam | MemberKind::Slab | MemberKind::Other);
+    let grade = Grade::named(&r.steel).filter(|_| spans)?;
+    let below = r.bars.iter().find(|b| matches!(b, Bars::Row { side_deg: 180.0, .. }))?;
+    let moment = WEIGHT * m.area * m.length * m.length / 8.0;
+    let d = m.across[0] - f64::from(r.cover_mm) * 1e-3 - 0.02;
+    let need = moment / (0.9 * d.max(0.01) * 1e6 * f64::from(grade.yield_mpa));
+    let have = f64::from(below.area());
+    (need > have).then_some([have, need])
+}
+
 /// The least share of the length of its bars and stirrups that must lie in a member.
 const INSIDE: f64 = 0.7;
 /// Lines and points of each that are looked at.
@@ -256,6 +273,21 @@ mod tests {
         // ρ_w = A_sw / (s b) ≥ .08 √30 / 500 = .876 ‰
         let legs = 2.0 * std::f32::consts::FRAC_PI_4 * s.diameter_mm.powi(2);
         assert!(legs / (s.spacing_mm * 300.0) >= 0.876e-3 && s.spacing_mm <= 400.0, "{s:?}");
+    }
+
+    /// By hand: a beam of .3 × .6 m weighs 4.5 kN/m; over 6 m M = 20 kNm needs .84 cm², and it has
+    /// 2.44 or more; over 20 m 225 kNm need 9.3 cm².
+    #[test]
+    fn least_bars_carry_a_short_beam_and_no_long_one() {
+        let of = |length: f64| {
+            let m = member(MemberKind::Beam, length, [0.6, 0.3]);
+            own_weight(&m, &reinforcement(&m, 30.0, 40.0).unwrap())
+        };
+        assert_eq!(of(6.0), None);
+        let [have, need] = of(20.0).unwrap();
+        assert!((need - 9.26e-4).abs() < 0.1e-4 && have < need, "{have} {need}");
+        let carried: Vec<bool> = (2..40).map(|l| of(f64::from(l)).is_none()).collect();
+        assert!(carried.windows(2).all(|w| w[0] || !w[1]), "{carried:?}");
     }
 
     #[test]

@@ -12,7 +12,7 @@ use glam::Vec3;
 use intrados_stage::{Job, file};
 
 use super::{
-    ImportError, Imported, Told,
+    ImportError, Imported, MaterialUse, Told,
     assume::{self, Measures, STEEL, YEARS},
     build::{Built, Found},
     grade::Concrete,
@@ -125,12 +125,15 @@ enum Bare {
     Thin,
     /// They would lie outside of it.
     Outside,
+    /// Its material is not known.
+    Unknown,
 }
 
 impl Bare {
     fn why(self) -> &'static str {
         match self {
             Self::Open => "nobody knows what lies in an open surface",
+            Self::Unknown => "its material may be no concrete",
             Self::Thin => "there is no room for bars with their cover",
             Self::Outside => {
                 "straight bars along the axis would lie outside of what is bent, or has a bent section"
@@ -160,12 +163,13 @@ fn detail<'a>(found: &'a Found, surface: &Surface, year: Option<i32>, told: &Tol
         assumed.push(Assumed::Age);
     }
     let fck = strength.or(concrete_class(&concrete)).unwrap_or(30.0);
-    let unknown = found.steel == 0 && found.other.is_none();
+    let unknown = found.steel == 0 && (found.other.is_none() || found.is_lightweight);
     let cover_mm = found.cover_mm.unwrap_or_else(|| assume::cover_mm(&exposure));
     let (mut reinforcement, mut bare) = (None, None);
     if unknown && found.tube.is_none() {
         let least = assume::reinforcement(&measures(found), f64::from(fck), cover_mm);
         match least {
+            _ if found.is_unknown => bare = Some(Bare::Unknown),
             _ if found.volume <= 0.0 => bare = Some(Bare::Open),
             None => bare = Some(Bare::Thin),
             Some(least) if !assume::fits(&least, found.frame, surface) => {
@@ -559,10 +563,13 @@ fn summary(folder: &Path, source: &Source, built: &Built, members: &[Detail]) ->
     let count = |what: Assumed| members.iter().filter(|m| m.assumed.contains(&what)).count();
     let mut notes: Vec<String> = source.notes.iter().chain(&built.notes).cloned().collect();
     let others: BTreeMap<&str, (usize, &Matter)> =
-        built.found.iter().filter_map(|f| f.other.as_ref()).fold(BTreeMap::new(), |mut m, o| {
-            m.entry(o.name.as_str()).or_insert((0, o)).0 += 1;
-            m
-        });
+        built.found.iter().filter(|f| !f.is_lightweight).filter_map(|f| f.other.as_ref()).fold(
+            BTreeMap::new(),
+            |mut m, o| {
+                m.entry(o.name.as_str()).or_insert((0, o)).0 += 1;
+                m
+            },
+        );
     for (count, matter) in others.into_values() {
         notes.push(format!(
             "{count} members are of {} (E some {} GPa, {} kg/m³), which is no concrete: {}",
@@ -578,16 +585,18 @@ fn summary(folder: &Path, source: &Source, built: &Built, members: &[Detail]) ->
         ));
     }
     notes.extend(bare(members));
+    notes.extend(too_few(members));
     if built.steel.loose > 0 {
+        let first = built.loose.first().map_or("", String::as_str);
         notes.push(format!(
-            "{} bars and tendons lie in no member and are shown alone",
+            "{} bars and tendons, such as \"{first}\", lie in no member and are shown alone: they reinforce nothing",
             built.steel.loose
         ));
     }
     // A glTF file's own reader may have said it.
     let is_told = notes.iter().any(|note| note.contains("no structural members"));
     if built.found.is_empty() && !is_told {
-        notes.push("no structural members were found: name nodes COL_…, BEAM_…, SLAB_…, WALL_…, FOOTING_…, LINING_…".into());
+        notes.push(no_members(&source.format).into());
     }
     Imported {
         folder: folder.into(),
@@ -599,8 +608,44 @@ fn summary(folder: &Path, source: &Source, built: &Built, members: &[Detail]) ->
         scenery: built.scenery.clone(),
         concrete_assumed: count(Assumed::Concrete),
         reinforcement_assumed: count(Assumed::Reinforcement),
+        materials: (built.materials.iter())
+            .map(|(name, (elements, taken_for))| MaterialUse {
+                name: name.clone(),
+                elements: *elements,
+                taken_for: taken_for.clone(),
+            })
+            .collect(),
         offset_m: built.offset.to_array(),
         notes,
+    }
+}
+
+/// Which members their assumed bars do not carry: that is a fault of the assumption, not of them.
+fn too_few(members: &[Detail]) -> Option<String> {
+    let of = |member: &Detail| {
+        let bars = member.reinforcement.as_ref().filter(|_| is_level(member.found))?;
+        let [have, need] = assume::own_weight(&measures(member.found), bars)?;
+        Some((member.found.name.clone(), 1e4 * have, 1e4 * need))
+    };
+    let short: Vec<_> = members.iter().filter_map(of).collect();
+    let (name, have, need) = short.first()?;
+    let count = match short.len() {
+        1 => "one member".to_owned(),
+        n => format!("{n} members"),
+    };
+    Some(format!(
+        "the least bars, which are assumed, do not carry the own weight of {count} between supports at both ends, such as \"{name}\" ({have:.1} cm² below, {need:.1} cm² needed): real ones have more; give reinforcement in details of scene.ron before you believe what is computed of them"
+    ))
+}
+
+/// What a model without members needs, in the words of its format.
+fn no_members(format: &str) -> &'static str {
+    if format.starts_with("IFC") {
+        "no structural members were found: export what bears as IfcColumn, IfcBeam, IfcSlab, IfcWall, IfcFooting, IfcMember or IfcPlate; an IfcBuildingElementProxy is a member where its name (\"pier 1\") or a property set (Pset_ColumnCommon) says of which kind"
+    } else if format.starts_with("OBJ") {
+        "no structural members were found: name groups (g or o) COL_…, BEAM_…, SLAB_…, WALL_…, FOOTING_…, LINING_…"
+    } else {
+        "no structural members were found: name nodes COL_…, BEAM_…, SLAB_…, WALL_…, FOOTING_…, LINING_…"
     }
 }
 
@@ -608,7 +653,8 @@ fn summary(folder: &Path, source: &Source, built: &Built, members: &[Detail]) ->
 fn bare(members: &[Detail]) -> Vec<String> {
     let mut of: BTreeMap<Bare, Vec<&str>> = BTreeMap::new();
     for member in members {
-        if let Some(why) = member.bare {
+        // Of unknown materials another note says it.
+        if let Some(why) = member.bare.filter(|why| *why != Bare::Unknown) {
             of.entry(why).or_default().push(&member.found.name);
         }
     }
@@ -659,6 +705,7 @@ fn readme(
         imported.loose_steel,
         listed(&imported.scenery)
     );
+    text += &materials(&imported.materials);
     text += &rules(built, members, imported, told.year.or(source.year), told);
     text += "\n## Place\n\n";
     let place = whereabouts(source, built);
@@ -673,6 +720,19 @@ fn readme(
         let _ = writeln!(text, "- {}", comment(note));
     }
     text
+}
+
+/// Each material with what was made of it, as a table.
+fn materials(all: &[MaterialUse]) -> String {
+    if all.is_empty() {
+        return "The file names no material.\n\n".into();
+    }
+    let cell = |text: &str| comment(text).replace('|', "\\|");
+    let rows = all
+        .iter()
+        .map(|m| format!("| {} | {} | {} |\n", cell(&m.name), m.elements, cell(&m.taken_for)));
+    let rows: String = rows.collect();
+    format!("| material | elements | taken for |\n|---|---:|---|\n{rows}\n")
 }
 
 fn listed(counts: &BTreeMap<String, usize>) -> String {
