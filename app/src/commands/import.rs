@@ -94,7 +94,15 @@ impl Report {
                 "members".into(),
             ],
         ];
-        let all: Vec<[String; 3]> = rows.into_iter().chain(kinds).chain(steel).collect();
+        let materials = told.materials.iter().map(|material| {
+            [
+                format!("material {}", material.name),
+                material.elements.to_string(),
+                material.taken_for.clone(),
+            ]
+        });
+        let all: Vec<[String; 3]> =
+            rows.into_iter().chain(kinds).chain(steel).chain(materials).collect();
         output::table(&all.map_rows())
     }
 }

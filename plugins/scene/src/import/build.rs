@@ -7,13 +7,13 @@ use std::{
 
 use glam::{DVec3, Mat4, Vec3};
 use intrados_stage::{Cancelled, Job};
-use serde_json::Value;
 
 use super::{
     KindByName,
     ask::Idle,
+    bars,
     close::{close, is_closed},
-    count, course, grade,
+    count, course, cover, grade,
     kind::{By, Verdict, Why, kind, lies_on_ground, likely},
     model::material,
     ring::{Piece, joined},
@@ -25,7 +25,7 @@ use crate::{
     Frame, Member, MemberKind, Mesh, Object, Part, SteelLine,
     gltf::Model,
     parametric,
-    structure::{self, ASSUMED_CONCRETE, Grade, Prestress, StrandGrade},
+    structure::{self, ASSUMED_CONCRETE, Grade},
 };
 
 /// A structure, built.
@@ -45,6 +45,12 @@ pub(super) struct Built {
     pub(super) scenery: BTreeMap<String, usize>,
     /// Those of them that may bear or weigh.
     pub(super) idle: Vec<Idle>,
+    /// Sentences about what was read with a doubt, with the names of what they are about.
+    pub(super) doubts: BTreeMap<String, Vec<String>>,
+    /// Materials by name: how many members or bars are of each, and what was made of it.
+    pub(super) materials: BTreeMap<String, (usize, String)>,
+    /// Names of the steel that lies in no member.
+    pub(super) loose: Vec<String>,
 }
 
 /// How many lines of steel.
@@ -67,8 +73,12 @@ pub(super) struct Found {
     pub(super) concrete: Option<grade::Concrete>,
     pub(super) exposure: Option<String>,
     pub(super) cover_mm: Option<f32>,
-    /// A material of it that is no concrete.
+    /// A material of it that is no concrete, or lightweight.
     pub(super) other: Option<structure::Matter>,
+    /// Whether `other` is a concrete that bars reinforce.
+    pub(super) is_lightweight: bool,
+    /// Whether the file names a material of it that is not known.
+    pub(super) is_unknown: bool,
     pub(super) frame: Frame,
     pub(super) across: [f64; 2],
     pub(super) is_round: bool,
@@ -196,6 +206,9 @@ impl Builder {
                 first.segments.len()
             ));
         }
+        for (doubt, names) in &self.built.doubts {
+            self.built.notes.push(format!("{}: {doubt}", several(names)));
+        }
         for found in self.built.found.iter().filter(|f| f.steel > 0 && f.bars == 0) {
             let links = found.steel;
             self.built.notes.push(format!(
@@ -317,10 +330,23 @@ impl Builder {
         let reach = element.surface.points.iter().map(|p| (*p - start).reject_from(axis).length());
         let is_round = reach.fold(0.0, f64::max) < 0.515 * across[0].min(across[1])
             && (across[0] / across[1] - 1.0).abs() < 0.03;
-        let concrete = match element.said.as_ref().and_then(|s| s.concrete.clone()) {
-            Some(class) => Some(grade::Concrete::Class(class)),
-            None => grade::concrete(element),
-        };
+        let mut made = grade::composition(element);
+        if let Some(class) = element.said.as_ref().and_then(|s| s.concrete.clone()) {
+            made.concrete = Some(grade::Concrete::Class(class));
+        }
+        let (cover_mm, cover_doubt) = cover::cover_mm(element, unit);
+        let (exposure, exposure_doubt) = cover::exposure(element);
+        let doubts = made.doubts.drain(..).chain(cover_doubt).chain(exposure_doubt);
+        for doubt in doubts {
+            self.built.doubts.entry(doubt).or_default().push(name.clone());
+        }
+        for material in &made.unknown {
+            let doubt = format!(
+                "material \"{material}\" is none that is known: it may be no concrete, and no bars are assumed; give concrete and reinforcement, or matter, in details of scene.ron"
+            );
+            self.built.doubts.entry(doubt).or_default().push(name.clone());
+        }
+        self.note_materials(std::mem::take(&mut made.materials));
         let index = self.built.model.members.len();
         self.built.model.members.push(Member {
             id: id.clone(),
@@ -342,10 +368,12 @@ impl Builder {
             kind,
             by,
             class: element.class.clone(),
-            concrete,
-            exposure: exposure(element),
-            cover_mm: cover_mm(element, unit),
-            other: grade::other_matter(&element.materials),
+            concrete: made.concrete,
+            exposure,
+            cover_mm,
+            other: made.other,
+            is_lightweight: made.is_lightweight,
+            is_unknown: !made.unknown.is_empty(),
             frame,
             across,
             is_round,
@@ -357,6 +385,25 @@ impl Builder {
             bars: 0,
         });
         self.surfaces.push((element.surface.clone(), bounds));
+    }
+
+    /// Counts a member or bar of these materials.
+    fn note_materials(&mut self, materials: Vec<(String, String)>) {
+        for (name, taken_for) in materials {
+            self.built.materials.entry(name).or_insert((0, taken_for)).0 += 1;
+        }
+    }
+
+    /// Materials of bars are the grades that were found in them.
+    fn note_steel(&mut self, element: &Element) {
+        let grade = grade::steel(element);
+        let taken_for = match grade {
+            Some(grade) => format!("steel of bars, {} MPa", grade.yield_mpa),
+            None => format!("steel of bars, {} assumed", super::assume::STEEL),
+        };
+        let names = element.materials.iter().map(|m| m.name.trim().to_owned());
+        let named = names.filter(|n| !n.is_empty()).map(|name| (name, taken_for.clone()));
+        self.note_materials(named.collect());
     }
 
     fn scenery(&mut self, element: &Element, why: Why) {
@@ -446,27 +493,34 @@ impl Builder {
     fn steel(&mut self, element: &Element) {
         let is_tendon = element.class == "IfcTendon"
             || element.said.as_ref().is_some_and(|s| s.kind == MemberKind::Tendon);
+        self.note_steel(element);
         let own;
         let courses = if element.courses.is_empty() {
-            own = course::of_surface(&element.surface);
+            own = course::all_of_surface(&element.surface);
             own.as_slice()
         } else {
             &element.courses
         };
-        let host = self.host(element, courses);
-        if host.is_none() || courses.is_empty() {
-            self.loose(element, courses, is_tendon);
+        let hosts = self.hosts(element, courses);
+        if courses.is_empty() {
+            self.loose(element, &[], is_tendon);
             return;
         }
-        for (k, course) in courses.iter().enumerate() {
-            let is_closed = course.line.first() == course.line.last();
-            let is_stirrup = is_closed
-                || matches!(element.predefined.as_str(), "LIGATURE" | "STIRRUP")
-                || element.said.as_ref().is_some_and(|s| s.part == Part::Stirrup);
-            let part = match (is_tendon, is_stirrup) {
-                (true, _) => Part::Tendon,
-                (false, true) => Part::Stirrup,
-                (false, false) => Part::Bar,
+        let in_none: Vec<Course> = (courses.iter().zip(&hosts))
+            .filter(|(_, host)| host.is_none())
+            .map(|(course, _)| course.clone())
+            .collect();
+        if !in_none.is_empty() {
+            self.loose(element, &in_none, is_tendon);
+        }
+        for (k, (course, host)) in courses.iter().zip(hosts).enumerate() {
+            if host.is_none() {
+                continue;
+            }
+            let part = match is_tendon {
+                true => Part::Tendon,
+                false if bars::is_link(element, course) => Part::Stirrup,
+                false => Part::Bar,
             };
             let object = self.draw(element, course, k, host, part);
             let line = self.line(element, course, part);
@@ -479,26 +533,28 @@ impl Builder {
         }
     }
 
-    /// The member that most of a bar lies in, else the one that it is said to be part of.
-    fn host(&self, element: &Element, courses: &[Course]) -> Option<usize> {
-        let points: Vec<DVec3> = courses.iter().flat_map(|c| c.samples(9)).collect();
+    /// For each bar of an element the member that most of it lies in, else the one that the element
+    /// is said to be part of.
+    fn hosts(&self, element: &Element, courses: &[Course]) -> Vec<Option<usize>> {
+        let above = element.above.iter().map(|a| &a.id);
+        let ids = element.said.iter().map(|s| &s.member).chain(above);
+        let said = ids.filter_map(|id| self.built.found.iter().position(|f| f.id == *id)).next();
+        courses.iter().map(|course| self.host(course).or(said)).collect()
+    }
+
+    fn host(&self, course: &Course) -> Option<usize> {
+        let points: Vec<DVec3> = course.samples(9);
         let within = |(surface, [low, high]): &(Surface, [DVec3; 2])| {
             let near = |p: &&DVec3| p.cmpge(*low).all() && p.cmple(*high).all();
             points.iter().filter(near).filter(|p| surface.holds(**p)).count()
         };
-        let most = self
-            .surfaces
+        self.surfaces
             .iter()
             .enumerate()
             .map(|(i, s)| (within(s), i))
             .filter(|(count, _)| 2 * count > points.len())
-            .max_by_key(|(count, i)| (*count, std::cmp::Reverse(*i)));
-        let said = || {
-            let above = element.above.iter().map(|a| &a.id);
-            let ids = element.said.iter().map(|s| &s.member).chain(above);
-            ids.filter_map(|id| self.built.found.iter().position(|f| f.id == *id)).next()
-        };
-        most.map(|(_, i)| i).or_else(said)
+            .max_by_key(|(count, i)| (*count, std::cmp::Reverse(*i)))
+            .map(|(_, i)| i)
     }
 
     /// A bar in no member is a member of its own, as it was before.
@@ -508,6 +564,7 @@ impl Builder {
         let part = if is_tendon { Part::Tendon } else { Part::Bar };
         let id = self.distinct(&element.id, true);
         let name = self.distinct(&full_name(element), false);
+        self.built.loose.push(name.clone());
         let index = self.built.model.members.len();
         self.built.model.members.push(Member {
             id,
@@ -539,7 +596,8 @@ impl Builder {
         member: Option<usize>,
         part: Part,
     ) -> usize {
-        if let Some(&object) = element.objects.get(k.min(element.objects.len().saturating_sub(1))) {
+        // A surface of several bars is shown as it is with the first of them.
+        if let Some(&object) = element.objects.get(k) {
             self.show(element, member, part, Frame::default());
             return object;
         }
@@ -556,8 +614,6 @@ impl Builder {
     }
 
     fn line(&mut self, element: &Element, course: &Course, part: Part) -> SteelLine {
-        let said = element.attributes.get("NominalDiameter").and_then(Value::as_f64);
-        let nominal = said.filter(|d| (1e-3..0.2).contains(d));
         let word = match part {
             Part::Tendon => "tendon",
             Part::Stirrup => "stirrup",
@@ -573,47 +629,35 @@ impl Builder {
             self.built.steel.assumed += 1;
         }
         let is_tendon = part == Part::Tendon;
-        let diameter = nominal.filter(|_| !is_tendon).unwrap_or(course.diameter) as f32;
+        let (mut diameter, mut doubts) = (course.diameter, Vec::new());
+        let prestress = is_tendon.then(|| {
+            let (prestress, doubted) = bars::prestress(element, course);
+            doubts = doubted;
+            prestress
+        });
+        if !is_tendon {
+            let (own, doubt) = bars::diameter(element, course);
+            diameter = own;
+            doubts.extend(doubt);
+        }
+        for doubt in doubts {
+            self.built.doubts.entry(doubt).or_default().push(name.clone());
+        }
         let line = course.line.iter().map(|p| p.as_vec3()).collect();
         SteelLine {
             grade: grade.filter(|_| !is_tendon),
-            prestress: is_tendon.then(|| prestress(element, course)),
-            ..SteelLine::new(name, part, diameter, line)
+            prestress,
+            ..SteelLine::new(name, part, diameter as f32, line)
         }
     }
 }
 
-/// How a tendon is stressed, as far as it is said: area and stress of the class' attributes, else
-/// .75 f_pk after stressing (EN 1992-1-1, 5.10.3) on strands that fill .35 of the duct.
-fn prestress(element: &Element, course: &Course) -> Prestress {
-    let number = |name: &str| element.attributes.get(name).and_then(Value::as_f64);
-    let named = element.attributes.get("SteelGrade").and_then(Value::as_str);
-    let grade = named.and_then(StrandGrade::named).or_else(|| StrandGrade::named("Y1860S7"));
-    let steel = grade.map_or("Y1860S7", |g| g.name);
-    let duct = std::f64::consts::FRAC_PI_4 * course.diameter * course.diameter;
-    let area_mm2 = 1e6 * number("CrossSectionArea").filter(|a| *a > 0.0).unwrap_or(0.35 * duct);
-    let strands = (area_mm2 / 140.0).round().clamp(1.0, 100.0);
-    // Pa, or MPa, or what the force comes to.
-    let stress = number("PreStress").map(|s| if s > 1e5 { s / 1e6 } else { s });
-    let force = number("TensionForce").map(|f| f / area_mm2);
-    let sane = |s: &f64| (100.0..2000.0).contains(s);
-    let usual = 0.75 * grade.map_or(1860.0, |g| f64::from(g.strength_mpa));
-    let stress_mpa = stress.filter(sane).or(force.filter(sane)).unwrap_or(usual) as f32;
-    let friction = number("FrictionCoefficient").filter(|f| (0.0..0.6).contains(f));
-    let slip = number("AnchorageSlip").filter(|s| (0.0..0.02).contains(s));
-    Prestress {
-        steel: steel.into(),
-        strands: strands as u32,
-        strand_mm2: (area_mm2 / strands) as f32,
-        stress_mpa,
-        at_days: 0.0,
-        friction: friction.unwrap_or(0.19) as f32,
-        wobble_per_m: 0.005,
-        slip_mm: 1e3 * slip.unwrap_or(0.005) as f32,
-        relaxation_class: 2,
-        both_ends: false,
-        bonded: true,
-        plate_mm: None,
+/// `"pier 1"`, `"pier 1" and 3 more`.
+fn several(names: &[String]) -> String {
+    match names {
+        [] => String::new(),
+        [one] => format!("\"{one}\""),
+        [first, rest @ ..] => format!("\"{first}\" and {} more", rest.len()),
     }
 }
 
@@ -635,32 +679,6 @@ fn full_name(element: &Element) -> String {
             && above.name != own
     });
     whole.map_or(own.clone(), |above| format!("{} / {own}", above.name.trim()))
-}
-
-/// The exposure class that a property set says.
-fn exposure(element: &Element) -> Option<String> {
-    let mut said = element.properties.values().flatten();
-    let (_, value) = said.find(|(name, _)| {
-        let name: String = name.to_lowercase().chars().filter(|c| c.is_alphabetic()).collect();
-        name.contains("exposureclass") || name.contains("expositionsklasse")
-    })?;
-    let classes: Vec<&str> = value
-        .as_str()?
-        .split(|c: char| !c.is_ascii_alphanumeric())
-        .filter(|word| crate::structure::Exposure::CLASSES.contains(word))
-        .collect();
-    (!classes.is_empty()).then(|| classes.join(", "))
-}
-
-/// The cover that a property set says, in the file's unit.
-fn cover_mm(element: &Element, unit: f64) -> Option<f32> {
-    let mut said = element.properties.values().flatten();
-    let (_, value) = said.find(|(name, _)| {
-        let name: String = name.to_lowercase().chars().filter(|c| c.is_alphabetic()).collect();
-        name.starts_with("concretecover") || name == "betondeckung"
-    })?;
-    let cover = 1e3 * unit * value.as_f64()?;
-    (5.0..=200.0).contains(&cover).then_some(cover as f32)
 }
 
 /// A tunnel's frame: along its axis, angles from the level on its right to the crown.

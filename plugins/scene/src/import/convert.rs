@@ -54,9 +54,21 @@ struct Answer {
     draft: Option<String>,
     ifcopenshell: String,
     units: Vec<String>,
+    /// The one of them that is used.
+    #[serde(default)]
+    unit: Option<String>,
     metres_per_unit: f64,
     year: Option<i32>,
+    /// The text that says so.
+    #[serde(default)]
+    year_text: String,
     project: String,
+    /// Names of all its projects.
+    #[serde(default)]
+    projects: Vec<String>,
+    /// Bars and tendons without a shape.
+    #[serde(default)]
+    steel_without_shape: usize,
     georeference: Georeference,
     elements: Vec<Told>,
 }
@@ -92,6 +104,9 @@ struct Told {
 struct ToldCourse {
     diameter: f64,
     line: Vec<[f64; 3]>,
+    /// Whether parameters of its disk cut it.
+    #[serde(default)]
+    is_cut: bool,
 }
 
 /// A surface in `shapes.bin`.
@@ -320,10 +335,12 @@ fn source(answer: Answer, shapes: &[u8]) -> Result<Source, String> {
     }
     if answer.units.iter().any(|u| Some(u) != answer.units.first()) {
         notes.push(format!(
-            "it has several units of length ({}): the first one is used",
-            answer.units.join(", ")
+            "it has several units of length ({}): {} is used; are sizes right?",
+            answer.units.join(", "),
+            answer.unit.as_ref().or(answer.units.first()).map_or("", String::as_str)
         ));
     }
+    notes.extend(remarks(&answer));
     let missing = bodiless(&answer.elements);
     let damaged: Vec<String> = (answer.elements.iter().filter(|e| !e.damaged.is_empty()))
         .map(|e| {
@@ -344,7 +361,7 @@ fn source(answer: Answer, shapes: &[u8]) -> Result<Source, String> {
     notes.extend(missing.into_iter().map(|m| format!("{m}: left out, and its load is missing")));
     notes.extend(elements.iter_mut().filter_map(|e| e.twice.take()));
     notes.extend(damaged);
-    let unit = answer.units.first().cloned().unwrap_or_default();
+    let unit = answer.unit.or(answer.units.first().cloned()).unwrap_or_default();
     let scale = answer.metres_per_unit;
     let georeference = georeference::resolve(answer.georeference, scale, &mut notes);
     Ok(Source {
@@ -358,6 +375,42 @@ fn source(answer: Answer, shapes: &[u8]) -> Result<Source, String> {
         notes,
         georeference,
     })
+}
+
+/// What the file says of itself that has two readings.
+fn remarks(answer: &Answer) -> Vec<String> {
+    let mut notes = Vec::new();
+    if answer.projects.len() > 1 {
+        notes.push(format!(
+            "it has {} projects: the units of \"{}\" are used for all; export them one by one",
+            answer.projects.len(),
+            answer.project
+        ));
+    }
+    if let Some(year) = answer.year
+        && answer.year_text.trim().trim_end_matches(".0") != year.to_string()
+    {
+        notes.push(format!(
+            "its year of construction is \"{}\": {year} is taken; say another one with --year",
+            crate::file::shorten(&answer.year_text)
+        ));
+    }
+    if answer.steel_without_shape > 0 {
+        notes.push(format!(
+            "{} reinforcing bars, meshes or tendons have no shape and are not used: export them with their geometry",
+            answer.steel_without_shape
+        ));
+    }
+    let cut = answer.elements.iter().filter(|e| e.courses.iter().any(|c| c.is_cut));
+    let cut: Vec<&Told> = cut.collect();
+    if let [first, ..] = &cut[..] {
+        notes.push(format!(
+            "StartParam and EndParam of {} bars (such as \"{}\") end them within their polyline, as IFC has it: are they so short?",
+            cut.len(),
+            first.name
+        ));
+    }
+    notes
 }
 
 /// Elements without a body, by class and reason; not those whose parts have one.

@@ -11,6 +11,48 @@ const MOST_CORNERS: usize = 200_000;
 /// A body is a bar if it is so many times as long as thick.
 const SLENDER: f64 = 5.0;
 
+/// The axes of all bars that a surface is made of: each of its pieces that is one.
+pub(super) fn all_of_surface(surface: &Surface) -> Vec<Course> {
+    pieces(surface).iter().filter_map(of_surface).collect()
+}
+
+/// The pieces of a surface that no corner connects.
+fn pieces(surface: &Surface) -> Vec<Surface> {
+    fn root(of: &mut [usize], mut at: usize) -> usize {
+        while of[at] != at {
+            of[at] = of[of[at]];
+            at = of[at];
+        }
+        at
+    }
+    let key = |p: DVec3| (p * 1e5).round().to_array().map(|x| x as i64);
+    let mut known: BTreeMap<[i64; 3], usize> = BTreeMap::new();
+    let mut of: Vec<usize> = Vec::new();
+    let mut faces = Vec::with_capacity(surface.triangles.len());
+    for corners in surface.faces() {
+        let at = corners.map(|p| {
+            *known.entry(key(p)).or_insert_with(|| {
+                of.push(of.len());
+                of.len() - 1
+            })
+        });
+        let first = root(&mut of, at[0]);
+        for other in [at[1], at[2]] {
+            let other = root(&mut of, other);
+            of[other] = first;
+        }
+        faces.push((at[0], corners));
+    }
+    let mut found: BTreeMap<usize, Surface> = BTreeMap::new();
+    for (at, corners) in faces {
+        let piece = found.entry(root(&mut of, at)).or_default();
+        let first = piece.points.len() as u32;
+        piece.points.extend(corners);
+        piece.triangles.push([first, first + 1, first + 2]);
+    }
+    found.into_values().collect()
+}
+
 /// The axis of a bar: corners are sorted by their way along the surface from one end, and slices
 /// of it have the axis' points in their middles. A closed bar has two middles a slice.
 pub(super) fn of_surface(surface: &Surface) -> Option<Course> {
@@ -249,6 +291,21 @@ mod tests {
         let mesh = solid::tube(line, diameter, closed);
         let points = mesh.positions.iter().map(|p| p.as_dvec3()).collect();
         of_surface(&Surface { points, triangles: mesh.triangles }).unwrap()
+    }
+
+    #[test]
+    fn bars_in_one_surface_are_counted() {
+        let mut surface = Surface::default();
+        for i in 0..14_u8 {
+            let start = Vec3::new(0.0, 0.0, 0.1 * f32::from(i));
+            let mesh = solid::tube(&[start, start + Vec3::new(3.0, 0.0, 0.0)], 0.02, false);
+            let first = surface.points.len() as u32;
+            surface.points.extend(mesh.positions.iter().map(|p| p.as_dvec3()));
+            surface.triangles.extend(mesh.triangles.iter().map(|t| t.map(|k| k + first)));
+        }
+        let found = all_of_surface(&surface);
+        assert_eq!(found.len(), 14);
+        assert!(found.iter().all(|c| (c.diameter - 0.02).abs() < 2e-4), "{found:?}");
     }
 
     #[test]

@@ -1,12 +1,15 @@
-//! Concrete and steel out of what people write: `C30/37`, `Beton C35/45`, `fc=40 MPa`, `BSt 500 S`.
+//! What a member and a bar are made of: by properties, then by the materials' names, and only where
+//! a name says a whole class (`C30/37`), by its own. A mark such as C20 or B15 is no grade.
 
 use serde_json::Value;
 
-use super::source::{Element, Matter};
-use crate::{
-    file::concrete_class,
-    structure::{self, Grade},
+use super::{
+    matter::{self, Substance, understand},
+    quantity::{Guess, Quantity, number_in, only_plausible},
+    source::{Element, Matter, Properties},
+    strength::{self, Reading},
 };
+use crate::structure::{self, Grade};
 
 /// What a member is made of, as far as it is said.
 #[derive(Debug, Clone, PartialEq)]
@@ -17,73 +20,155 @@ pub(super) enum Concrete {
     Strength(f32),
 }
 
-/// Classes of EN 206 by their cylinder strength.
-const CLASSES: [(u32, u32); 15] = [
-    (8, 10),
-    (12, 15),
-    (16, 20),
-    (20, 25),
-    (25, 30),
-    (30, 37),
-    (35, 45),
-    (40, 50),
-    (45, 55),
-    (50, 60),
-    (55, 67),
-    (60, 75),
-    (70, 85),
-    (80, 95),
-    (90, 105),
-];
-
-/// Classes of DIN 1045 (1978), by cubes, and those of today that DIN 1045-1 put in their place.
-const GERMAN: [(&str, u32); 5] = [("B15", 12), ("B25", 20), ("B35", 30), ("B45", 35), ("B55", 45)];
-
-/// A material that is no concrete: words by which it goes; what it is taken for: Young's modulus,
-/// GPa, Poisson's ratio, density, kg/m³, thermal expansion, 1e-6/K; and what it bears in tension,
-/// MPa, where it is not brittle.
-type Other = (&'static [&'static str], [f32; 4], Option<f32>);
-
-/// Materials that are no concrete. Words of reinforced concrete are taken out before.
-///
-/// Wood: C24 of EN 338, expansion and Poisson's ratio ours. Steel: S235 of EN 1993-1-1, 3.2.6, where
-/// its name says no other; copper alike in stiffness to within a factor of two. Aluminium: EN
-/// 1999-1-1, 3.2.5, and EN AW-6063 T6 of its table 3.2b. Glass: EN 572-1. Masonry: E = 1000 f_k of EN
-/// 1996-1-1, 3.7.2, with f_k = 5 MPa. Stone, soil, asphalt and insulation: ours.
-const OTHERS: [Other; 9] = [
-    (&["wood", "timber", "holz", "glulam", "bois"], [11.0, 0.3, 420.0, 5.0], Some(24.0)),
-    (&["alumin"], [70.0, 0.3, 2700.0, 23.0], Some(160.0)),
-    (
-        &["steel", "stahl", "acier", "acero", "metal", "copper"],
-        [210.0, 0.3, 7850.0, 12.0],
-        Some(235.0),
-    ),
-    (&["glass", "glas"], [70.0, 0.23, 2500.0, 9.0], None),
-    (&["masonry", "mauerwerk", "brick", "ziegel"], [5.0, 0.2, 1800.0, 6.0], None),
-    (&["stone", "granite", "naturstein"], [40.0, 0.25, 2600.0, 8.0], None),
-    (&["asphalt"], [3.0, 0.35, 2400.0, 25.0], None),
-    (&["soil"], [0.05, 0.3, 1900.0, 10.0], None),
-    (&["insulation", "dämmung"], [0.01, 0.2, 50.0, 10.0], None),
-];
-const CONCRETES: [&str; 8] =
-    ["stahlbeton", "reinforced", "concrete", "beton", "béton", "hormig", "calcestruzzo", "betong"];
-
-/// What a member's properties and materials say of its concrete.
-pub(super) fn concrete(element: &Element) -> Option<Concrete> {
-    let sets =
-        std::iter::once(&element.properties).chain(element.materials.iter().map(|m| &m.properties));
-    for (name, value) in sets.flat_map(|sets| sets.values()).flatten() {
-        if let Some(found) = of_property(name, value) {
-            return Some(found);
-        }
-    }
-    let names = element.materials.iter().flat_map(|m| [&m.name, &m.category]);
-    names.chain(&element.words).chain([&element.name]).find_map(|text| of_text(text))
+/// What a member is made of.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(super) struct Composition {
+    pub(super) concrete: Option<Concrete>,
+    /// What it is taken for where it is no concrete, or lightweight.
+    pub(super) other: Option<structure::Matter>,
+    /// Whether `other` is a concrete, which bars reinforce.
+    pub(super) is_lightweight: bool,
+    /// Materials of which the file says a name that is not known.
+    pub(super) unknown: Vec<String>,
+    /// Sentences about what was read with a doubt.
+    pub(super) doubts: Vec<String>,
+    /// Each material by name, with what was made of it.
+    pub(super) materials: Vec<(String, String)>,
 }
 
-fn of_property(name: &str, value: &Value) -> Option<Concrete> {
-    let name: String = name.to_lowercase().chars().filter(|c| c.is_alphanumeric()).collect();
-    let says_class = [
+/// What is said of a member's matter.
+pub(super) fn composition(element: &Element) -> Composition {
+    let mut found = Composition::default();
+    let is_named = element.class.starts_with("Ifc");
+    let mut concrete: Option<Reading> = None;
+    let mut others = Vec::new();
+    let mut is_concrete = false;
+    for material in &element.materials {
+        let mut understood = understand(material, is_named);
+        if let Substance::Concrete(by_name) = &mut understood.substance {
+            is_concrete = true;
+            if let Some((_, reading)) = strength_of(&material.properties, &mut found.doubts) {
+                understood.taken_for = format!("concrete: {}", reading.meaning);
+                *by_name = Some(reading);
+            }
+            if let Some(reading) = by_name.take() {
+                if reading.is_doubtful {
+                    let name = label(material);
+                    found.doubts.push(format!("material \"{name}\": {}", reading.meaning));
+                }
+                concrete = concrete.or(Some(reading));
+            }
+        }
+        match &understood.substance {
+            Substance::Other(matter) => others.push(matter.clone()),
+            Substance::Unknown | Substance::Bars => found.unknown.push(label(material)),
+            Substance::Concrete(_) | Substance::Unsaid => {}
+        }
+        found.materials.push((label(material), understood.taken_for));
+    }
+    if !is_concrete && !others.is_empty() {
+        found.other = dominant(others);
+        found.unknown.clear();
+        return found;
+    }
+    // What is said of the element itself comes before its materials.
+    if let Some((place, own)) = strength_of(&element.properties, &mut found.doubts) {
+        found.materials.push((place, format!("concrete: {}", own.meaning)));
+        if let Some(other) = concrete.as_ref().filter(|c| c.concrete != own.concrete) {
+            found.doubts.push(format!(
+                "a property says {} and the material {}: the property is taken",
+                words(&own.concrete),
+                words(&other.concrete)
+            ));
+        }
+        concrete = Some(own);
+    }
+    let names = || element.words.iter().chain([&element.name]);
+    let by_name = || names().find_map(|name| strength::pair(&name.to_uppercase()));
+    let reading = concrete.or_else(|| by_name().filter(|r| !r.is_doubtful));
+    if is_concrete || reading.is_some() {
+        found.unknown.clear();
+    }
+    if let Some(light) = reading.as_ref().filter(|r| r.is_lightweight) {
+        let fck = match &light.concrete {
+            Concrete::Class(class) => crate::file::concrete_class(class).unwrap_or(30.0),
+            Concrete::Strength(mpa) => *mpa,
+        };
+        let name = format!("lightweight concrete L{}", words(&light.concrete));
+        found.other = Some(matter::lightweight(&name, f64::from(fck)));
+        found.is_lightweight = true;
+    }
+    found.concrete = reading.map(|r| r.concrete);
+    found
+}
+
+/// Boards on studs are boards: a framed wall is not solid steel.
+fn dominant(others: Vec<structure::Matter>) -> Option<structure::Matter> {
+    let stiffest = |list: &[structure::Matter]| {
+        list.iter().max_by(|a, b| a.modulus_gpa.total_cmp(&b.modulus_gpa)).cloned()
+    };
+    let is_board = |m: &&structure::Matter| m.density_kg_m3 < 1000.0 && m.strength_mpa.is_none();
+    let has_masonry = others.iter().any(|m| m.strength_mpa.is_none() && m.density_kg_m3 > 1500.0);
+    match others.iter().find(|m| is_board(m) && m.modulus_gpa > 1.0) {
+        Some(board) if !has_masonry => Some(board.clone()),
+        _ => stiffest(&others),
+    }
+}
+
+fn label(material: &Matter) -> String {
+    let name = if material.name.trim().is_empty() { &material.category } else { &material.name };
+    if name.trim().is_empty() { "without a name".into() } else { name.trim().to_owned() }
+}
+
+/// A strength in a few words.
+fn words(concrete: &Concrete) -> String {
+    match concrete {
+        Concrete::Class(class) => class.clone(),
+        Concrete::Strength(mpa) => format!("{mpa} MPa"),
+    }
+}
+
+/// The first strength that a property says, and which one; doubts are added to a list.
+fn strength_of(sets: &Properties, doubts: &mut Vec<String>) -> Option<(String, Reading)> {
+    for (set, values) in sets {
+        for (name, value) in values {
+            let place = format!("{set}.{name}");
+            match of_property(name, value) {
+                Some(Ok(reading)) => {
+                    if reading.is_doubtful {
+                        doubts.push(format!("{place}: {}", reading.meaning));
+                    }
+                    return Some((place, reading));
+                }
+                Some(Err(why)) => doubts.push(format!("{place} says {}: {why}", said(value))),
+                None => {}
+            }
+        }
+    }
+    None
+}
+
+fn said(value: &Value) -> String {
+    match (Quantity::of(value), value.as_str()) {
+        (Some(quantity), _) => quantity.raw.to_string(),
+        (None, Some(text)) => format!("\"{text}\""),
+        _ => value.to_string(),
+    }
+}
+
+/// What a property says of the strength of concrete. `None`: it is about something else. An error
+/// says why it is not used.
+fn of_property(name: &str, value: &Value) -> Option<Result<Reading, String>> {
+    let joined: String = name.to_lowercase().chars().filter(|c| c.is_alphanumeric()).collect();
+    let words = words_of(name);
+    let has = |list: &[&str]| words.iter().any(|word| list.contains(&word.as_str()));
+    let holds = |list: &[&str]| list.iter().any(|part| joined.contains(part));
+    if holds(&["reinforcement", "rebar", "steel", "yield", "bewehrung", "masonry", "mortar"])
+        || has(&["grain", "wood", "timber", "soil"])
+    {
+        return None;
+    }
+    const CLASSES: [&str; 6] = [
         "strengthclass",
         "concreteclass",
         "concretegrade",
@@ -91,112 +176,142 @@ fn of_property(name: &str, value: &Value) -> Option<Concrete> {
         "betonklasse",
         "festigkeitsklasse",
     ];
-    if says_class.iter().any(|word| name.contains(word)) && !name.contains("reinforcement") {
-        return of_text(value.as_str()?);
+    const STRENGTHS: [&str; 9] = [
+        "compressivestrength",
+        "compressionstrength",
+        "cubestrength",
+        "cylinderstrength",
+        "fck",
+        "fcu",
+        "rck",
+        "druckfestigkeit",
+        "specifiedstrength",
+    ];
+    if holds(&CLASSES) {
+        let text = value.as_str().filter(|t| !t.trim().is_empty())?;
+        let unread = "it is no class that is known, and is not used".to_owned();
+        return Some(strength::of_text(text).ok_or(unread));
     }
-    if ["compressivestrength", "fck", "druckfestigkeit"].iter().any(|word| name.contains(word)) {
-        let number = value.as_f64().or_else(|| first_number(value.as_str()?))?;
-        return strength(if number > 1e4 { number / 1e6 } else { number });
-    }
-    None
-}
-
-/// A strength in MPa, if concrete can have it: a class where it is one.
-fn strength(mpa: f64) -> Option<Concrete> {
-    let known = CLASSES.iter().find(|(cylinder, _)| (f64::from(*cylinder) - mpa).abs() < 0.01);
-    match known {
-        Some((cylinder, cube)) => Some(Concrete::Class(format!("C{cylinder}/{cube}"))),
-        None => (5.0..=150.0).contains(&mpa).then_some(Concrete::Strength(mpa as f32)),
-    }
-}
-
-/// A class or a strength somewhere in a text.
-pub(super) fn of_text(text: &str) -> Option<Concrete> {
-    let words = || text.split(|c: char| !(c.is_alphanumeric() || "/.=".contains(c)));
-    for word in words() {
-        let word = word.trim_start_matches(['L', 'H']);
-        if concrete_class(word).is_some() {
-            return Some(Concrete::Class(word.into()));
-        }
-        // `C35/45-XC4` was cut above; `C35/45XC4` is cut here.
-        let digits = |c: char| c.is_ascii_digit() || c == '/';
-        let cut =
-            word.strip_prefix('C').map(|rest| rest.find(|c| !digits(c)).unwrap_or(rest.len()));
-        if let Some(start) = cut.and_then(|end| word.get(..=end))
-            && concrete_class(start).is_some()
-        {
-            return Some(Concrete::Class(start.into()));
-        }
-        let alone = word.strip_prefix('C').and_then(|n| n.parse::<u32>().ok());
-        if let Some(found) = CLASSES.iter().find(|(cylinder, _)| alone == Some(*cylinder)) {
-            return Some(Concrete::Class(format!("C{}/{}", found.0, found.1)));
-        }
-        if let Some((_, cylinder)) = GERMAN.iter().find(|(name, _)| *name == word) {
-            return strength(f64::from(*cylinder));
-        }
-    }
-    by_unit(text)
-}
-
-/// `fc = 40 MPa`, `f'c 5000 psi`, `40 N/mm²`.
-fn by_unit(text: &str) -> Option<Concrete> {
-    let low = text.to_lowercase();
-    let (unit, scale) = [("mpa", 1.0), ("n/mm", 1.0), ("psi", 0.006_894_757)]
-        .into_iter()
-        .find(|(unit, _)| low.contains(unit))?;
-    let before = low.split(unit).next()?.trim_end();
-    let begin = before.rfind(|c: char| !(c.is_ascii_digit() || c == '.')).map_or(0, |i| {
-        i + before.get(i..).and_then(|rest| rest.chars().next()).map_or(1, char::len_utf8)
-    });
-    strength(before.get(begin..)?.parse::<f64>().ok()? * scale)
-}
-
-fn first_number(text: &str) -> Option<f64> {
-    let begin = text.find(|c: char| c.is_ascii_digit())?;
-    let rest = text.get(begin..)?;
-    let end = rest.find(|c: char| !(c.is_ascii_digit() || c == '.')).unwrap_or(rest.len());
-    rest.get(..end)?.parse().ok()
-}
-
-/// A material that is surely no concrete, with what it is taken for.
-pub(super) fn other_matter(materials: &[Matter]) -> Option<structure::Matter> {
-    let is_concrete = |text: &str| CONCRETES.iter().any(|word| text.contains(word));
-    let other = |m: &Matter| {
-        let text = format!("{} {}", m.name, m.category).to_lowercase();
-        let is_it = |(words, ..): &&Other| words.iter().any(|w| text.contains(w));
-        let (_, [modulus_gpa, poisson, density_kg_m3, expansion_1e6_k], strength) =
-            *OTHERS.iter().find(is_it)?;
-        let matter = structure::Matter {
-            name: m.name.clone(),
-            modulus_gpa,
-            poisson,
-            density_kg_m3,
-            expansion_1e6_k,
-            strength_mpa: strength.map(|least| of_class(&m.name).unwrap_or(least)),
-        };
-        (!is_concrete(&text)).then_some(matter)
-    };
-    let concrete = |m: &Matter| is_concrete(&m.name.to_lowercase());
-    if materials.iter().any(concrete) {
+    if !holds(&STRENGTHS) && joined != "fc" {
         return None;
     }
-    materials.iter().find_map(other)
+    // Of a test: when it was made, by which method, on which day.
+    if has(&["age", "alter", "prüfalter", "date", "datum", "method", "standard", "norm", "number"])
+        || (has(&["days", "day", "tage", "d"]) && !joined.contains("28"))
+    {
+        return early(&words).map(Err);
+    }
+    if has(&["early", "transfer", "release", "stripping", "initial", "frühfestigkeit"]) {
+        return Some(Err("this is no strength after 28 days, and is not used".into()));
+    }
+    if has(&["design", "fcd", "bemessung", "bemessungswert"]) {
+        return Some(Err("a design strength has its safety factor in it, and is not used".into()));
+    }
+    let is_mean = has(&["mean", "average", "mittel", "mittelwert", "fcm"]);
+    Some(of_number(value, strength::is_cube(&format!("{} {joined}", name.to_lowercase())), is_mean))
 }
 
-/// Yield strength of a structural steel by its name in EN 10025, bending strength of wood by its
-/// class in EN 338 (C for softwood, D for hardwood) or EN 14080 (GL), MPa: `S355J2`, `C24`, `GL28h`.
-fn of_class(name: &str) -> Option<f32> {
-    let words = name.split(|c: char| !c.is_alphanumeric());
-    let of_word = |word: &str| {
-        let (prefix, range) = [("S", 235..=960), ("GL", 20..=36), ("C", 14..=50), ("D", 18..=80)]
-            .into_iter()
-            .find(|(prefix, _)| word.starts_with(prefix))?;
-        let rest = word.strip_prefix(prefix)?;
-        let digits = rest.find(|c: char| !c.is_ascii_digit()).unwrap_or(rest.len());
-        let mpa: u32 = rest.get(..digits)?.parse().ok()?;
-        range.contains(&mpa).then_some(mpa as f32)
+/// A strength after so many days is early where there are fewer than 28.
+fn early(words: &[String]) -> Option<String> {
+    let days = words.iter().find_map(|word| word.parse::<u32>().ok())?;
+    (days < 28).then(|| format!("this is the strength after {days} days, and is not used"))
+}
+
+/// Words of a property's name, in small letters: `CompressiveStrength28Days`.
+fn words_of(name: &str) -> Vec<String> {
+    let mut words: Vec<String> = vec![String::new()];
+    let mut last = ' ';
+    for c in name.chars() {
+        let begins = (c.is_uppercase() && last.is_lowercase())
+            || (c.is_numeric() != last.is_numeric() && c.is_alphanumeric());
+        if !c.is_alphanumeric() || begins {
+            words.push(String::new());
+        }
+        if c.is_alphanumeric()
+            && let Some(word) = words.last_mut()
+        {
+            word.extend(c.to_lowercase());
+        }
+        last = c;
+    }
+    words.retain(|w| !w.is_empty());
+    words
+}
+
+/// Units that a strength without one, or with a wrong one, may have been written in, MPa.
+const UNITS: [(&str, f64); 6] = [
+    ("MPa", 1.0),
+    ("kPa", 1e-3),
+    ("Pa", 1e-6),
+    ("psi", 0.006_894_757),
+    ("ksi", 6.894_757),
+    ("kg/cm²", 0.098_066_5),
+];
+/// Strengths that are plausible where no unit is said, MPa.
+const PLAUSIBLE: std::ops::RangeInclusive<f64> = 8.0..=120.0;
+
+fn of_number(value: &Value, is_cube: bool, is_mean: bool) -> Result<Reading, String> {
+    if let Some(text) = value.as_str() {
+        if let Some((mpa, _)) = strength::mpa_in(text) {
+            let is_cube = is_cube || strength::is_cube(&text.to_lowercase());
+            return of_mpa((mpa, None), is_cube, is_mean);
+        }
+        if let Some(reading) = strength::of_text(text) {
+            return Ok(reading);
+        }
+        let (number, rest) = number_in(text).ok_or("it is no strength, and is not used")?;
+        let is_bare = rest.trim().is_empty();
+        return match is_bare {
+            true => of_mpa(guessed(number)?, is_cube, is_mean),
+            false => Err("it is no strength that is known, and is not used".into()),
+        };
+    }
+    let Some(Quantity { raw, si }) = Quantity::of(value) else {
+        return Err("it is no number, and is not used".into());
     };
-    words.filter_map(of_word).next()
+    if raw == 0.0 {
+        return Err("it is taken for not said".into());
+    }
+    match si.map(|pascal| 1e-6 * pascal) {
+        Some(mpa) if (5.0..=150.0).contains(&mpa) => of_mpa((mpa, None), is_cube, is_mean),
+        _ => of_mpa(guessed(raw)?, is_cube, is_mean),
+    }
+}
+
+/// A number without a unit that can be believed: MPa where that is plausible, else the only unit in
+/// which it is, with its name.
+fn guessed(raw: f64) -> Result<(f64, Option<&'static str>), String> {
+    if PLAUSIBLE.contains(&raw) {
+        return Ok((raw, Some("MPa")));
+    }
+    match only_plausible(raw, &UNITS, &PLAUSIBLE) {
+        Guess::Only(mpa, unit) => Ok((mpa, Some(unit))),
+        Guess::No => Err("no unit makes that a strength of concrete, and it is not used".into()),
+    }
+}
+
+fn of_mpa(
+    (mpa, guess): (f64, Option<&str>),
+    is_cube: bool,
+    is_mean: bool,
+) -> Result<Reading, String> {
+    let mut meaning = format!("{:.4} MPa", mpa).replace(".0000", "");
+    if let Some(unit) = guess {
+        meaning += &format!(", its number being taken for {unit}");
+    }
+    let mut cylinder = mpa;
+    if is_cube {
+        cylinder = strength::of_cube(mpa);
+        meaning += &format!(" on cubes, {cylinder:.1} MPa on cylinders");
+    }
+    if is_mean {
+        // EN 1992-1-1, table 3.1.
+        cylinder -= 8.0;
+        meaning += &format!(" in the mean, f_ck = {cylinder:.1} MPa");
+    }
+    let is_doubtful = guess.is_some_and(|unit| unit != "MPa") || is_mean;
+    strength::reading(cylinder, meaning, is_doubtful)
+        .ok_or_else(|| "no concrete is so strong or so weak, and it is not used".into())
 }
 
 /// The grade of a bar: by its attribute, its materials, its names.
@@ -214,14 +329,15 @@ pub(super) fn steel(element: &Element) -> Option<Grade> {
         .find_map(grade_in)
 }
 
-fn grade_in(text: &str) -> Option<Grade> {
+/// The grade of bars that a text names: `B500B`, `BSt 500 S`, `Rebar b450c`.
+pub(super) fn grade_in(text: &str) -> Option<Grade> {
     if let Some(grade) = Grade::named(text) {
         return Some(grade);
     }
     let low = text.to_lowercase();
     // DIN 488 (1984): BSt 500 S is of the ductility that is B today; BSt 420 S yields at 420 MPa.
     if low.contains("bst") {
-        let fy = first_number(&low)? as f32;
+        let fy = number_in(&low)?.0 as f32;
         let named = Grade::named("B500B")?;
         return (200.0..=600.0).contains(&fy).then(|| named.at(Some(fy)));
     }
@@ -231,78 +347,101 @@ fn grade_in(text: &str) -> Option<Grade> {
 
 #[cfg(test)]
 mod tests {
+    use serde_json::json;
+
     use super::*;
 
-    fn class(text: &str) -> Option<String> {
-        match of_text(text)? {
-            Concrete::Class(name) => Some(name),
-            Concrete::Strength(mpa) => Some(format!("{mpa:.1}")),
-        }
+    fn class(element: &Element) -> Option<String> {
+        composition(element).concrete.map(|c| words(&c))
     }
 
-    #[test]
-    fn classes_are_found_in_what_people_write() {
-        let is = |text: &str, expected: &str| {
-            assert_eq!(class(text).as_deref(), Some(expected), "{text}")
-        };
-        is("C30/37", "C30/37");
-        is("Beton C35/45", "C35/45");
-        is("Concrete_C25/30_XC4", "C25/30");
-        is("LC30/33", "C30/33");
-        is("Stahlbeton C40", "C40/50");
-        is("B25 Ortbeton", "C20/25");
-        is("fc=40 MPa", "C40/50");
-        is("f'c = 4000 psi", "27.6");
-        is("28 N/mm²", "28.0");
-        for none in ["Concrete", "B500B", "C4 wall", "Stahlbeton 65690", "STB d=30", "", "250 MPa"]
-        {
-            assert_eq!(class(none), None, "{none}");
-        }
+    fn with(set: &str, name: &str, value: Value) -> Element {
+        let mut element = Element::default();
+        element.properties.entry(set.into()).or_default().insert(name.into(), value);
+        element
     }
 
     #[test]
     fn properties_speak_before_names() {
         let mut element = Element { name: "C20/25".into(), ..Element::default() };
-        assert_eq!(concrete(&element), Some(Concrete::Class("C20/25".into())));
+        assert_eq!(class(&element).as_deref(), Some("C20/25"));
         let mut put = |set: &str, name: &str, value: Value| {
             element.properties.entry(set.into()).or_default().insert(name.into(), value);
-            concrete(&element)
+            class(&element)
         };
-        let reinforcement = put("Pset", "ReinforcementStrengthClass", "C99/99".into());
-        assert_eq!(reinforcement, Some(Concrete::Class("C20/25".into())));
-        assert_eq!(
-            put("Pset_MaterialConcrete", "CompressiveStrength", 4.2e7.into()),
-            Some(Concrete::Strength(42.0))
-        );
-        assert_eq!(
-            put("A", "StrengthClass", "C50/60".into()),
-            Some(Concrete::Class("C50/60".into()))
-        );
+        assert_eq!(put("Pset", "ReinforcementStrengthClass", "C99/99".into()).unwrap(), "C20/25");
+        let strength = put("Pset_MaterialConcrete", "CompressiveStrength", 4.2e7.into());
+        assert_eq!(strength.unwrap(), "42 MPa");
+        assert_eq!(put("A", "StrengthClass", "C50/60".into()).unwrap(), "C50/60");
+    }
+
+    /// Columns are called C20, beams B15, and walls M30: none is a grade.
+    #[test]
+    fn a_mark_is_no_grade() {
+        for mark in ["C20", "C50", "B15", "B25", "M30", "Stütze C25", "Fc24", "HA-30", "S355"] {
+            let element = Element {
+                class: "IfcColumn".into(),
+                name: mark.into(),
+                words: vec![mark.into()],
+                ..Element::default()
+            };
+            assert_eq!(composition(&element), Composition::default(), "{mark}");
+        }
     }
 
     #[test]
-    fn what_is_no_concrete_is_told_from_what_is() {
-        let of = |name: &str| {
-            let matter = [Matter { name: name.into(), ..Matter::default() }];
-            other_matter(&matter).is_some()
-        };
-        assert!(of("wood-generic") && of("Steel S355") && of("stone_granite_masonry"));
-        assert!(!of("Stahlbeton - Ortbeton") && !of("steel-reinforced concrete") && !of("Solid"));
+    fn numbers_of_properties_are_read_by_what_they_mean() {
+        let typed = |value: f64, si: f64| json!({"value": value, "si": si, "unit": "PRESSUREUNIT"});
+        for (name, value, expected, is_doubted) in [
+            ("CompressiveStrength", typed(30.0, 30e6), Some("C30/37"), false),
+            ("CompressiveStrength", typed(30e3, 30e6), Some("C30/37"), false),
+            // No unit of pressure in the file, and MPa written.
+            ("CompressiveStrength", typed(30.0, 30.0), Some("C30/37"), false),
+            ("Fck,cube", json!(37.0), Some("C30/37"), false),
+            ("CharacteristicCubeStrength", json!(37.0), Some("C30/37"), false),
+            ("f_ck,cube", json!("37 MPa"), Some("C30/37"), false),
+            ("CompressiveStrength28Days", json!(35.0), Some("C35/45"), false),
+            ("CompressiveStrength", json!(4000.0), Some("27.58 MPa"), true),
+            ("CompressiveStrength", json!("4,000 psi"), Some("27.58 MPa"), false),
+            ("MeanCompressiveStrength", json!(38.0), Some("C30/37"), true),
+            ("CompressiveStrengthTestAge", json!(28.0), None, false),
+            ("Compressive strength test age days", json!(28), None, false),
+            ("CompressiveStrength at 7 days", json!(20), None, true),
+            ("DesignCompressiveStrength", json!(20), None, true),
+            ("CompressiveStrength", json!(1e12), None, true),
+            ("CompressiveStrength", json!(15000), None, true),
+            ("StrengthClass", json!("strong"), None, true),
+            ("CompressiveStrengthParallelToGrain", json!(21), None, false),
+        ] {
+            let found = composition(&with("Pset", name, value.clone()));
+            let class = found.concrete.as_ref().map(words);
+            assert_eq!(class.as_deref(), expected, "{name} {value}");
+            assert_eq!(!found.doubts.is_empty(), is_doubted, "{name} {value}: {:?}", found.doubts);
+        }
     }
 
     #[test]
-    fn what_bears_tension_says_how_much() {
-        let of = |name: &str| {
-            let matter = [Matter { name: name.into(), ..Matter::default() }];
-            other_matter(&matter).unwrap().strength_mpa
+    fn materials_decide_together() {
+        let of = |names: &[&str]| {
+            let material = |name: &&str| Matter { name: (*name).into(), ..Matter::default() };
+            composition(&Element {
+                class: "IfcWall".into(),
+                materials: names.iter().map(material).collect(),
+                ..Element::default()
+            })
         };
+        let sandwich = of(&["Wärmedämmung - hart", "Stahlbeton - Ortbeton"]);
+        assert_eq!((sandwich.other, sandwich.unknown), (None, vec![]));
+        let framed = of(&["Gypsum board", "Metal stud", "Gypsum board"]).other.unwrap();
+        assert_eq!(framed.strength_mpa, None);
+        assert_eq!(of(&["Brick", "Plaster"]).other.unwrap().density_kg_m3, 1800.0);
+        assert_eq!(of(&["XK-12"]).unknown, ["XK-12"]);
+        assert_eq!(of(&["B500B"]).unknown, ["B500B"]);
+        let light = of(&["LC30/33"]);
+        assert!(light.is_lightweight && light.other.is_some() && !light.doubts.is_empty());
         assert_eq!(
-            [of("wood-generic"), of("Holz C30"), of("Glulam GL28h")],
-            [24.0, 30.0, 28.0].map(Some)
-        );
-        assert_eq!(
-            [of("Steel S355J2"), of("Steel"), of("Masonry")],
-            [Some(355.0), Some(235.0), None]
+            of(&["C30/37", "B500B"]),
+            Composition { doubts: vec![], ..of(&["C30/37", "B500B"]) }
         );
     }
 

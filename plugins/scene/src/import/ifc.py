@@ -113,17 +113,34 @@ def plain(value):
 
 
 def properties(thing):
-    """All sets of a thing and of its type: {set: {property: value}}."""
+    """All sets of a thing and of its type: {set: {property: value}}; what has a dimension as
+    {"value", "si", "unit"}."""
     try:
-        sets = about.get_psets(thing)
+        sets = about.get_psets(thing, verbose=True)
     except Exception:  # A set that is damaged says nothing.
         return {}
     told = {}
     for name, values in sets.items():
-        kept = {k: plain(v) for k, v in values.items() if k != "id" and plain(v) is not None}
+        kept = {k: measured(v) for k, v in values.items() if k != "id"}
+        kept = {k: v for k, v in kept.items() if v is not None}
         if kept:
             told[name] = kept
     return told
+
+
+def measured(said):
+    """A property of `get_psets(verbose=True)`: plain, or with its value in SI units."""
+    if not isinstance(said, dict):
+        return plain(said)
+    value = plain(said.get("value"))
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return value
+    own = None
+    try:
+        own = getattr(units.model.by_id(said["id"]), "Unit", None)
+    except Exception:
+        pass
+    return units.quantity(value, said.get("value_type") or "", own)
 
 
 def materials(element):
@@ -151,11 +168,15 @@ def learn_matter(model):
         own = sets.setdefault(getattr(kept, "Name", None) or kept.is_a(), {})
         for name, value in kept.get_info(recursive=False).items():
             if isinstance(value, (int, float)) and name != "id":
-                own[name] = value
+                is_strength = "Strength" in name or "Stress" in name
+                own[name] = units.quantity(value, "IfcPressureMeasure" if is_strength else "", None)
         for p in getattr(kept, "ExtendedProperties", None) or ():
-            value = getattr(getattr(p, "NominalValue", None), "wrappedValue", None)
-            if plain(value) is not None:
-                own[p.Name] = plain(value)
+            nominal = getattr(p, "NominalValue", None)
+            value = plain(getattr(nominal, "wrappedValue", None))
+            if isinstance(value, (int, float)) and not isinstance(value, bool):
+                value = units.quantity(value, nominal.is_a(), getattr(p, "Unit", None))
+            if value is not None:
+                own[p.Name] = value
 
 
 def above(element):
@@ -172,28 +193,34 @@ def above(element):
     return told
 
 
-ATTRIBUTES = (
-    "NominalDiameter", "CrossSectionArea", "BarLength", "SteelGrade", "TensionForce", "PreStress",
-    "FrictionCoefficient", "AnchorageSlip", "BarSurface", "BarRole", "SheathDiameter",
-)
+# Attributes of bars, meshes and tendons with the dimension of each; "" has none.
+ATTRIBUTES = {
+    "NominalDiameter": "LENGTHUNIT", "BarLength": "LENGTHUNIT", "AnchorageSlip": "LENGTHUNIT",
+    "SheathDiameter": "LENGTHUNIT", "LongitudinalBarNominalDiameter": "LENGTHUNIT",
+    "TransverseBarNominalDiameter": "LENGTHUNIT", "CrossSectionArea": "AREAUNIT",
+    "TensionForce": "FORCEUNIT", "PreStress": "PRESSUREUNIT", "SteelGrade": "", "BarSurface": "",
+    "BarRole": "", "FrictionCoefficient": "",
+}
 
 
-LENGTHS = ("NominalDiameter", "BarLength", "AnchorageSlip", "SheathDiameter")
-
-
-def attributes(element, scale, area):
-    """What bars and tendons, or their types, say as attributes of the class, in m and m²."""
-    told = {}
+def attributes(element):
+    """What bars and tendons, or their types, say as attributes of the class, in m, m², N and Pa;
+    under `raw` the numbers as the file has them."""
+    told, raw = {}, {}
     for thing in (about.get_type(element), element):
-        for name in ATTRIBUTES if thing is not None else ():
+        for name, unit in ATTRIBUTES.items() if thing is not None else ():
             value = plain(getattr(thing, name, None))
-            if value is not None:
-                in_metres = scale if name in LENGTHS else area if name == "CrossSectionArea" else None
-                told[name] = value * in_metres if in_metres else value
+            if value is None:
+                continue
+            told[name] = value * units.factor(unit) if unit else value
+            if unit:
+                raw[name] = value
+    if raw:
+        told["raw"] = raw
     return told
 
 
-def said(element, scale, area):
+def said(element):
     kind = about.get_type(element)
     return {
         "step": element.id(),
@@ -206,7 +233,7 @@ def said(element, scale, area):
         "above": above(element),
         "properties": properties(element),
         "materials": materials(element),
-        "attributes": attributes(element, scale, area),
+        "attributes": attributes(element),
         "courses": [],
         "shapes": [],
         "items": "",
@@ -214,11 +241,11 @@ def said(element, scale, area):
     }
 
 
-def said_of(element, scale, area):
+def said_of(element):
     """The same of any element: what is damaged in it is left out, and a GlobalId that is missing is
     an empty one."""
     try:
-        told = said(element, scale, area)
+        told = said(element)
     except Exception as error:
         told = {
             "step": element.id(), "class": element.is_a(), "name": str(element.Name or ""),
@@ -231,40 +258,117 @@ def said_of(element, scale, area):
     return told
 
 
-def length_units(model):
-    """Names of the project's units of length, how many metres the first one is, and how many
-    square metres its unit of area."""
-    names, scale, area = [], None, None
-    for project in instances(model, "IfcProject"):
-        units = getattr(project, "UnitsInContext", None)
-        for unit in units.Units if units else ():
-            kind = getattr(unit, "UnitType", None)
-            if kind == "LENGTHUNIT":
-                prefix = getattr(unit, "Prefix", None) or ""
-                names.append(f"{prefix} {unit.Name}".strip().lower())
-                scale = scale or metres(unit)
-            elif kind == "AREAUNIT" and area is None:
-                # The prefix of a square metre is that of the metre, squared.
-                area = metres(unit) if unit.is_a("IfcConversionBasedUnit") else metres(unit) ** 2
-    return names, scale, area or (scale or 1.0) ** 2
+PREFIX = {
+    "EXA": 1e18, "PETA": 1e15, "TERA": 1e12, "GIGA": 1e9, "MEGA": 1e6, "KILO": 1e3, "HECTO": 1e2,
+    "DECA": 1e1, "DECI": 1e-1, "CENTI": 1e-2, "MILLI": 1e-3, "MICRO": 1e-6, "NANO": 1e-9,
+}
+POWER = {"SQUARE_METRE": 2, "CUBIC_METRE": 3}
 
 
-PREFIX = {"KILO": 1e3, "HECTO": 1e2, "DECA": 1e1, "DECI": 1e-1, "CENTI": 1e-2, "MILLI": 1e-3, "MICRO": 1e-6}
-
-
-def metres(unit):
+def si(unit):
+    """How many of the SI unit of its dimension a unit is; none where nobody can say."""
+    if unit is None:
+        return None
+    if unit.is_a("IfcSIUnit"):
+        # The prefix of a square metre is that of the metre, squared; kilograms are the SI unit.
+        factor = PREFIX.get(unit.Prefix, 1.0) ** POWER.get(unit.Name, 1)
+        return factor * 1e-3 if unit.Name == "GRAM" else factor
     if unit.is_a("IfcConversionBasedUnit"):
         factor = unit.ConversionFactor
-        own = metres(factor.UnitComponent)
-        own = own**2 if unit.UnitType == "AREAUNIT" else own
-        return float(factor.ValueComponent.wrappedValue) * own
-    return PREFIX.get(getattr(unit, "Prefix", None), 1.0)
+        own = si(factor.UnitComponent)
+        number = float(factor.ValueComponent.wrappedValue)
+        return number * own if own and number > 0 else None
+    if unit.is_a("IfcDerivedUnit"):
+        product = 1.0
+        for part in unit.Elements:
+            own = si(part.Unit)
+            if own is None:
+                return None
+            product *= own ** part.Exponent
+        return product
+    return None
+
+
+MEASURES = {
+    "IfcLengthMeasure": "LENGTHUNIT", "IfcPositiveLengthMeasure": "LENGTHUNIT",
+    "IfcNonNegativeLengthMeasure": "LENGTHUNIT", "IfcAreaMeasure": "AREAUNIT",
+    "IfcPressureMeasure": "PRESSUREUNIT", "IfcForceMeasure": "FORCEUNIT",
+    "IfcModulusOfElasticityMeasure": "MODULUSOFELASTICITYUNIT",
+}
+
+
+class Units:
+    """Units of the project: the first one of each dimension."""
+
+    def __init__(self, model, project):
+        self.model, self.known, self.lengths = model, {}, []
+        assignment = getattr(project, "UnitsInContext", None)
+        for unit in assignment.Units if assignment else ():
+            kind, factor = getattr(unit, "UnitType", None), None
+            try:
+                factor = si(unit)
+            except Exception:  # A unit that is damaged says nothing.
+                pass
+            if kind == "LENGTHUNIT" and factor:
+                self.lengths.append((label(unit), factor, unit))
+            if factor:
+                self.known.setdefault(kind, factor)
+
+    def factor(self, dimension):
+        """SI units where the project says none; areas by its length."""
+        if dimension == "AREAUNIT":
+            return self.known.get(dimension) or self.known.get("LENGTHUNIT", 1.0) ** 2
+        return self.known.get(dimension) or 1.0
+
+    def quantity(self, value, measure, own):
+        dimension, factor = MEASURES.get(measure), None
+        if own is not None:
+            dimension, factor = getattr(own, "UnitType", None) or dimension, si(own)
+        elif dimension:
+            factor = self.factor(dimension)
+        if not factor or not dimension:
+            return value
+        return {"value": value, "si": value * factor, "unit": dimension}
+
+    def use(self, model, project, chosen):
+        """Leaves one project with one unit of length: of several units IfcOpenShell takes the last
+        one, and of several contexts, as of a library beside the project, none."""
+        for context in instances(model, "IfcContext" if model.schema != "IFC2X3" else "IfcProject"):
+            if context != project:
+                model.remove(context)
+        others = [unit for _, _, unit in self.lengths if unit != chosen]
+        if others:
+            kept = project.UnitsInContext
+            kept.Units = [u for u in kept.Units if u not in others]
+
+
+units = None  # Of the project, once it is open.
+
+
+def label(unit):
+    prefix = getattr(unit, "Prefix", None) or ""
+    return f"{prefix} {unit.Name}".strip().lower()
+
+
+def likely_units(model, projects):
+    """Units of the first project and the first of its lengths in which what is extruded is as long
+    as a member can be; of the first project where none is."""
+    depths = sorted(s.Depth for s in instances(model, "IfcExtrudedAreaSolid"))
+    told = [(project, Units(model, project)) for project in projects]
+    told = [(project, known) for project, known in told if known.lengths]
+    if not told:
+        fault("units")
+    for project, known in told if depths else ():
+        for length in known.lengths:
+            if 0.05 <= depths[len(depths) // 2] * length[1] <= 100:
+                return project, known, length
+    return *told[0], told[0][1].lengths[0]
 
 
 def georeference(model):
     """Where the model's origin lies on earth, as far as the file says it; lengths in m."""
     told = {}
-    _, scale, _ = length_units(model)
+    scale = units.factor("LENGTHUNIT")
     conversion = map_conversion(model)
     if conversion is not None:
         own, crs, unit = conversion
@@ -300,40 +404,41 @@ def map_conversion(model):
     for conversion in conversions[:1]:
         crs = conversion.TargetCRS
         unit = getattr(crs, "MapUnit", None)
-        return conversion.get_info(recursive=False), (crs.Name or "") if crs else "", metres(unit) if unit else None
+        return conversion.get_info(recursive=False), (crs.Name or "") if crs else "", si(unit)
     for thing in instances(model, "IfcSite")[:1] + instances(model, "IfcProject")[:1]:
         sets = {name.lower(): values for name, values in properties(thing).items()}
         own = sets.get("epset_mapconversion")
         if own and model.schema == "IFC2X3":
             crs = sets.get("epset_projectedcrs", {})
             unit = {"METRE": 1.0, "METER": 1.0, "MILLIMETRE": 1e-3, "FOOT": 0.3048}.get(str(crs.get("MapUnit", "")).upper())
+            own = {k: v["value"] if isinstance(v, dict) else v for k, v in own.items()}
             return own, str(crs.get("Name", "")), unit
     return None
 
 
 def year(model):
-    """When it was built, from any property of that name."""
+    """When it was built, from any property of that name, and the text that says so."""
     for name in ("IfcBuilding", "IfcFacility", "IfcFacilityPart", "IfcSite", "IfcProject"):
         for thing in instances(model, name):
             for values in properties(thing).values():
                 for key, value in values.items():
                     found = re.search(r"\b(1[89]|20)\d\d\b", str(value))
                     if re.search(r"year.?of.?construction|construction.?year|baujahr", key, re.I) and found:
-                        return int(found.group())
-    return None
+                        return int(found.group()), str(value)
+    return None, ""
 
 
-def disks(representation, matrix, scale):
+def disks(representation, matrix):
     """Swept disks of a representation with their placements; none where there is anything else."""
     found = []
     for item in representation.Items:
         if item.is_a("IfcMappedItem"):
             inner = disks(item.MappingSource.MappedRepresentation,
-                          matrix @ placement.get_mappeditem_transformation(item), scale)
+                          matrix @ placement.get_mappeditem_transformation(item))
             if inner is None:
                 return None
             found += inner
-        elif item.is_a("IfcSweptDiskSolid") and item.StartParam is None and item.EndParam is None:
+        elif item.is_a("IfcSweptDiskSolid"):
             found.append((matrix, item))
         else:
             return None
@@ -348,16 +453,41 @@ def courses(element, settings, scale):
     for representation in body:
         try:
             matrix = placement.get_local_placement(element.ObjectPlacement)
-            for matrix, disk in disks(representation, matrix, scale) or ():
+            for matrix, disk in disks(representation, matrix) or ():
                 matrix = matrix.copy()
                 matrix[:3, 3] *= scale
                 curve = geom.create_shape(settings, disk.Directrix)
                 points = ordered(numpy.array(curve.verts).reshape(-1, 3), curve.edges)
+                points, is_cut = trimmed(disk, points)
                 points = points @ matrix[:3, :3].T + matrix[:3, 3]
-                told.append({"diameter": 2 * disk.Radius * scale, "line": points.tolist()})
+                # What is mapped to half its size is half as thick.
+                size = abs(numpy.linalg.det(matrix[:3, :3])) ** (1 / 3)
+                told.append({"diameter": 2 * disk.Radius * scale * size, "line": points.tolist(),
+                             "is_cut": is_cut})
         except Exception:  # Its surface says where it runs.
             return []
     return told
+
+
+def trimmed(disk, points):
+    """What StartParam and EndParam leave of a disk's axis, and whether that is less than all. A
+    polyline counts its pieces; other curves are taken whole, as authoring tools mean them."""
+    start, end = disk.StartParam, disk.EndParam
+    if not disk.Directrix.is_a("IfcPolyline"):
+        return points, False
+    last = len(points) - 1
+    start = 0.0 if start is None else max(0.0, start)
+    end = float(last) if end is None else min(float(last), end)
+    if start >= end or (start == 0.0 and end == last):
+        return points, False
+
+    def at(parameter):
+        below = min(int(parameter), last - 1)
+        share = parameter - below
+        return points[below] * (1 - share) + points[below + 1] * share
+
+    inner = [points[i] for i in range(last + 1) if start < i < end]
+    return numpy.array([at(start), *inner, at(end)]), True
 
 
 def ordered(points, edges):
@@ -625,34 +755,32 @@ def shapes_of(model, bodies, path, most, hear, progress):
             queue[:0] = [rest[i:i + size] for i in range(0, len(rest), size)]
 
 
-def forget_libraries(model):
-    """Takes libraries and second projects out, in memory: IfcOpenShell knows no unit beside them, and
-    millimetres would be metres."""
-    projects = [p for p in instances(model, "IfcProject") if getattr(p, "UnitsInContext", None)]
-    for other in instances(model, "IfcProjectLibrary") + projects[1:]:
-        model.remove(other)
-
-
 def main(path, folder, most=60.0):
     bound_to_parent()
+    global units
     try:
         model, draft = opened(path)
     except Exception as error:
         fault("damaged", error)
     if not model.by_type("IfcProject"):
         fault("damaged", "there is no IfcProject in it")
-    forget_libraries(model)
-    units, scale, area = length_units(model)
-    if not scale or not scale > 0:
-        fault("units")
+    projects = model.by_type("IfcProject")
+    titles = [p.Name or "" for p in projects]
+    project, units, (chosen, scale, unit) = likely_units(model, projects)
+    title = project.Name or ""
+    units.known["LENGTHUNIT"] = scale
+    units.use(model, project, unit)
     bodies = [e for e in model.by_type("IfcProduct")
               if e.Representation and (not of_class(e, NO_BODIES) or of_class(e, PARTS))]
     if not bodies:
         fault("empty")
     told = {
         "schema": model.schema_identifier, "draft": draft, "ifcopenshell": ifcopenshell.version,
-        "units": units, "metres_per_unit": scale, "year": year(model),
-        "project": model.by_type("IfcProject")[0].Name or "",
+        "units": [name for name, _, _ in units.lengths], "unit": chosen, "metres_per_unit": scale,
+        "year": year(model)[0], "year_text": year(model)[1],
+        "project": title, "projects": titles,
+        "steel_without_shape": sum(1 for e in instances(model, "IfcReinforcingElement")
+                                   if not e.Representation),
         "georeference": georeference(model),
     }
     lines = geom.settings()
@@ -664,7 +792,7 @@ def main(path, folder, most=60.0):
             say(done=i, total=2 * len(bodies), what="reading properties")
         if i % 20 == 0 and is_orphan():
             sys.exit(1)
-        element = elements[body.id()] = said_of(body, scale, area)
+        element = elements[body.id()] = said_of(body)
         element["reason"] = keep_bodies(body)
         if not body.GlobalId:  # Its iterator waits for ever where there is none.
             body.GlobalId = ifcopenshell.guid.new()

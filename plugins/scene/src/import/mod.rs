@@ -11,22 +11,27 @@
 
 mod ask;
 mod assume;
+mod bars;
 mod build;
 mod close;
 mod convert;
 mod count;
 mod course;
+mod cover;
 mod doubt;
 mod georeference;
 mod grade;
 mod ground;
 mod kind;
+mod matter;
 mod model;
 mod project;
+mod quantity;
 mod ring;
 mod shape;
 mod source;
 mod stray;
+mod strength;
 
 pub use assume::concrete as concrete_of;
 pub use convert::ifcopenshell;
@@ -107,10 +112,23 @@ pub struct Imported {
     pub concrete_assumed: usize,
     /// Members whose reinforcement was assumed.
     pub reinforcement_assumed: usize,
+    /// Each material of members and bars that the file names, with what was made of it.
+    pub materials: Vec<MaterialUse>,
     /// What was taken off all coordinates, m.
     pub offset_m: [f64; 3],
     /// What a user should know.
     pub notes: Vec<String>,
+}
+
+/// A material that a file names.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct MaterialUse {
+    /// Its name in the file.
+    pub name: String,
+    /// How many members, or elements of bars, are of it.
+    pub elements: usize,
+    /// What it was taken for.
+    pub taken_for: String,
 }
 
 /// Why a model was not imported. One line each.

@@ -15,7 +15,7 @@ use intrados_stage::{
 };
 
 use super::{
-    ImportError, Imported, Told,
+    ImportError, Imported, MaterialUse, Told,
     ask::questions,
     assume::{self, Carrying, Measures, STEEL, YEARS},
     build::{Built, Found},
@@ -116,12 +116,15 @@ enum Bare {
     Thin,
     /// They would lie outside of it.
     Outside,
+    /// Its material is not known.
+    Unknown,
 }
 
 impl Bare {
     fn why(self) -> &'static str {
         match self {
             Self::Open => "nobody knows what lies in an open surface",
+            Self::Unknown => "its material may be no concrete",
             Self::Thin => "there is no room for bars with their cover",
             Self::Outside => {
                 "straight bars along the axis would lie outside of what is bent, or has a bent section"
@@ -151,12 +154,13 @@ fn detail<'a>(found: &'a Found, surface: &Surface, year: Option<i32>, told: &Tol
         assumed.push(Assumed::Age);
     }
     let fck = strength.or(concrete_class(&concrete)).unwrap_or(30.0);
-    let unknown = found.steel == 0 && found.other.is_none();
+    let unknown = found.steel == 0 && (found.other.is_none() || found.is_lightweight);
     let cover_mm = found.cover_mm.unwrap_or_else(|| assume::cover_mm(&exposure));
     let (mut reinforcement, mut bare) = (None, None);
     if unknown && found.tube.is_none() {
         let least = assume::reinforcement(&measures(found), f64::from(fck), cover_mm);
         match least {
+            _ if found.is_unknown => bare = Some(Bare::Unknown),
             _ if found.volume <= 0.0 => bare = Some(Bare::Open),
             None => bare = Some(Bare::Thin),
             Some(least) if !assume::fits(&least, found.frame, surface) => {
@@ -638,10 +642,13 @@ fn summary(
     let standing = standing(built);
     notes.extend(questions(built, &standing, &on_ground(&standing)));
     let others: BTreeMap<&str, (usize, &Matter)> =
-        built.found.iter().filter_map(|f| f.other.as_ref()).fold(BTreeMap::new(), |mut m, o| {
-            m.entry(o.name.as_str()).or_insert((0, o)).0 += 1;
-            m
-        });
+        built.found.iter().filter(|f| !f.is_lightweight).filter_map(|f| f.other.as_ref()).fold(
+            BTreeMap::new(),
+            |mut m, o| {
+                m.entry(o.name.as_str()).or_insert((0, o)).0 += 1;
+                m
+            },
+        );
     for (count, matter) in others.into_values() {
         notes.push(format!(
             "{count} members are of {} (E some {} GPa, {} kg/m³), which is no concrete: {}",
@@ -659,8 +666,9 @@ fn summary(
     notes.extend(bare(members));
     notes.extend(carried);
     if built.steel.loose > 0 {
+        let first = built.loose.first().map_or("", String::as_str);
         notes.push(format!(
-            "{} bars and tendons lie in no member and are shown alone",
+            "{} bars and tendons, such as \"{first}\", lie in no member and are shown alone: they reinforce nothing",
             built.steel.loose
         ));
     }
@@ -679,6 +687,13 @@ fn summary(
         scenery: built.scenery.clone(),
         concrete_assumed: count(Assumed::Concrete),
         reinforcement_assumed: count(Assumed::Reinforcement),
+        materials: (built.materials.iter())
+            .map(|(name, (elements, taken_for))| MaterialUse {
+                name: name.clone(),
+                elements: *elements,
+                taken_for: taken_for.clone(),
+            })
+            .collect(),
         offset_m: built.offset.to_array(),
         notes,
     }
@@ -711,7 +726,8 @@ fn no_members(source: &Source, built: &Built) -> String {
 fn bare(members: &[Detail]) -> Vec<String> {
     let mut of: BTreeMap<Bare, Vec<&str>> = BTreeMap::new();
     for member in members {
-        if let Some(why) = member.bare {
+        // Of unknown materials another note says it.
+        if let Some(why) = member.bare.filter(|why| *why != Bare::Unknown) {
             of.entry(why).or_default().push(&member.found.name);
         }
     }
@@ -762,6 +778,7 @@ fn readme(
         imported.loose_steel,
         listed(&imported.scenery)
     );
+    text += &materials(&imported.materials);
     text += &rules(source, built, members, imported, told.year.or(source.year), told);
     text += "\n## Place\n\n";
     let place = whereabouts(source, built);
@@ -776,6 +793,19 @@ fn readme(
         let _ = writeln!(text, "- {}", comment(note));
     }
     text
+}
+
+/// Each material with what was made of it, as a table.
+fn materials(all: &[MaterialUse]) -> String {
+    if all.is_empty() {
+        return "The file names no material.\n\n".into();
+    }
+    let cell = |text: &str| comment(text).replace('|', "\\|");
+    let rows = all
+        .iter()
+        .map(|m| format!("| {} | {} | {} |\n", cell(&m.name), m.elements, cell(&m.taken_for)));
+    let rows: String = rows.collect();
+    format!("| material | elements | taken for |\n|---|---:|---|\n{rows}\n")
 }
 
 fn listed(counts: &BTreeMap<String, usize>) -> String {
