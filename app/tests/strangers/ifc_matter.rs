@@ -179,12 +179,19 @@ fn bars_and_links_are_counted_with_data() {
         ("bars_nominal_mm_in_m", vec![straight; 4], 0, ""),
         ("bars_trimmed", vec![bar(20.0, 1.95)], 0, "StartParam and EndParam"),
         ("stirrups", vec![link(8.0, 1.38), link(8.0, 1.28), straight, straight], 0, ""),
-        ("stirrups_2x3_hooks", vec![link(8.0, 1.44); 3], 0, "no bars along"),
+        (
+            "stirrups_2x3_hooks",
+            vec![link(8.0, 1.44), link(8.0, 1.44), link(8.0, 1.44), straight, straight],
+            0,
+            "",
+        ),
     ];
     for (name, mut expected, loose, word) in table {
         let import = Import::public(name);
-        let mut found = import.steel();
-        assert_eq!(found.len(), expected.len(), "{name}: {found:?} {}", import.notes);
+        let count = import.number("steel_lines");
+        assert_eq!(count, expected.len() as u64, "{name}: {}", import.notes);
+        // Where the file has none, those that are assumed are drawn.
+        let mut found = if count == 0 { vec![] } else { import.steel() };
         let order = |line: &(Part, f64, f64)| (1e3 * line.1 + line.2 * 100.0).round() as i64;
         found.sort_by_key(order);
         expected.sort_by_key(order);
