@@ -633,6 +633,19 @@ def forget_libraries(model):
         model.remove(other)
 
 
+def keep_first_units(model):
+    """Leaves one unit of a kind, in memory, the first: IfcOpenShell takes the last."""
+    for assignment in instances(model, "IfcUnitAssignment"):
+        kinds, kept = set(), []
+        for unit in assignment.Units:
+            kind = getattr(unit, "UnitType", None)
+            if kind is None or kind not in kinds or kind == "USERDEFINED":
+                kept.append(unit)
+            kinds.add(kind)
+        if len(kept) < len(assignment.Units):
+            assignment.Units = kept
+
+
 def main(path, folder, most=60.0):
     bound_to_parent()
     try:
@@ -645,6 +658,7 @@ def main(path, folder, most=60.0):
     units, scale, area = length_units(model)
     if not scale or not scale > 0:
         fault("units")
+    keep_first_units(model)
     bodies = [e for e in model.by_type("IfcProduct")
               if e.Representation and (not of_class(e, NO_BODIES) or of_class(e, PARTS))]
     if not bodies:
