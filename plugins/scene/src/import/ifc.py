@@ -755,6 +755,19 @@ def shapes_of(model, bodies, path, most, hear, progress):
             queue[:0] = [rest[i:i + size] for i in range(0, len(rest), size)]
 
 
+def keep_first_units(model):
+    """Leaves one unit of a kind, in memory, the first: IfcOpenShell takes the last."""
+    for assignment in instances(model, "IfcUnitAssignment"):
+        kinds, kept = set(), []
+        for unit in assignment.Units:
+            kind = getattr(unit, "UnitType", None)
+            if kind is None or kind not in kinds or kind == "USERDEFINED":
+                kept.append(unit)
+            kinds.add(kind)
+        if len(kept) < len(assignment.Units):
+            assignment.Units = kept
+
+
 def main(path, folder, most=60.0):
     bound_to_parent()
     global units
@@ -770,6 +783,7 @@ def main(path, folder, most=60.0):
     title = project.Name or ""
     units.known["LENGTHUNIT"] = scale
     units.use(model, project, unit)
+    keep_first_units(model)
     bodies = [e for e in model.by_type("IfcProduct")
               if e.Representation and (not of_class(e, NO_BODIES) or of_class(e, PARTS))]
     if not bodies:
