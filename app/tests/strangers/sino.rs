@@ -9,7 +9,7 @@ fn scanned(file: &Path, more: &[&str]) -> (bool, String) {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
     let args = ["scan", "--pixel-mm", "0.5", "--sinogram", file.to_str().unwrap(), "--out"];
-    let done = run(&[&args, &[out.to_str().unwrap()], more].concat());
+    let done = run(&[&args[..], &[out.to_str().unwrap()], more].concat());
     assert_eq!(done.status.success(), out.join("scan.json").exists(), "{}", said(&done));
     (done.status.success(), said(&done))
 }
