@@ -71,7 +71,7 @@ pub(crate) fn disc_tiff(dots: u32) -> Vec<u8> {
 /// What `detect` found: slices, and everything it says.
 fn detected(file: &Path, more: &[&str]) -> (Vec<Value>, String) {
     let args = ["detect", file.to_str().unwrap(), "--method", "classical", "--format", "json"];
-    let done = run(&[&args, more].concat());
+    let done = run(&[&args[..], more].concat());
     let text = said(&done);
     assert!(done.status.success(), "{file:?} {text}");
     let json: Value = serde_json::from_slice(&done.stdout).unwrap();

@@ -61,10 +61,9 @@ pub fn sinogram_doubts(sinogram: &Sinogram, is_arc_given: bool) -> Vec<String> {
     }
     if orbit.beam == Beam::Parallel {
         let middle = sinogram.row(orbit.rows() / 2);
-        doubts.extend(axis_doubt(&middle, orbit));
-        if !is_arc_given {
-            doubts.extend(arc_doubt(&middle, orbit));
-        }
+        // By another arc than the true one the axis would seem off, too.
+        let arc = if is_arc_given { None } else { arc_doubt(&middle, orbit) };
+        doubts.extend(arc.or_else(|| axis_doubt(&middle, orbit)));
     }
     doubts
 }
