@@ -8,6 +8,27 @@ pub(crate) fn say(line: impl Display) {
     let _ = writeln!(std::io::stderr(), "{}", printable(&line.to_string()));
 }
 
+/// Where the log goes: stderr, without what steers a terminal. Its own colours stay; in messages it
+/// escapes what begins like them itself.
+pub(crate) struct LogWriter;
+
+impl Write for LogWriter {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        let text = String::from_utf8_lossy(bytes);
+        let shown = |c: char| match c {
+            '\u{1b}' => c.to_string(),
+            c => printable(c.encode_utf8(&mut [0; 4])).into_owned(),
+        };
+        let text: String = text.chars().map(shown).collect();
+        std::io::stderr().write_all(text.as_bytes())?;
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        std::io::stderr().flush()
+    }
+}
+
 /// A message without line breaks, whoever wrote it.
 pub(crate) fn one_line(message: &str) -> String {
     message

@@ -16,7 +16,7 @@ use tracing_subscriber::EnvFilter;
 use crate::{
     Build,
     args::{Cli, Command, Common, Format},
-    console::{one_line, say},
+    console::{LogWriter, one_line, say},
     failure::{Failure, Outcome},
     progress::Progress,
 };
@@ -161,7 +161,7 @@ fn start_log(common: &Common) {
         .with_env_filter(
             EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(level)),
         )
-        .with_writer(std::io::stderr)
+        .with_writer(|| LogWriter)
         .with_ansi(colour)
         // Else it panics where stderr is full.
         .log_internal_errors(false)

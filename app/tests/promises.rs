@@ -43,7 +43,7 @@ fn a_model_that_cannot_be_written_to_is_refused_at_once() {
     for (python, word) in [("/nowhere/python", "cannot be run"), ("true", "m.ifc")] {
         let mut command = program();
         command.env("INTRADOS_PYTHON", python).args(["predict", text(&at("s.ron"))]);
-        command.args(["--ifc", text(&at("m.ifc")), "--out", text(&at("out"))]);
+        command.args(["--ifc", text(&at("m.ifc")), "--out", text(&at("out")), "--quiet"]);
         let output = command.output().unwrap();
         let line = said(&output);
         assert!([65, 66].contains(&output.status.code().unwrap()), "{line}");
