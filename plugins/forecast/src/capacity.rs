@@ -20,7 +20,7 @@ use intrados_damage::zone::{ZONES, zone_at};
 use intrados_mechanics::{
     analysis::analyze,
     member::{Along, Handed, Meshing, Prepared, Reach, Weakening, elastic, prepare_within},
-    model::MarchSettings,
+    model::{Failure, MarchSettings},
     strength::{Mode, Strength},
 };
 use intrados_scene::Scene;
@@ -165,9 +165,21 @@ pub fn capacity(
         };
         strength(&prepared, state, job)
     });
-    let strengths = strengths.collect::<Result<Vec<Strength>, ForecastError>>()?;
+    let mut strengths: Vec<Result<Strength, ForecastError>> = strengths.collect();
+    // With one standard error more it may not even carry what acts: then that error is as large.
+    let worse = match strengths.len() {
+        3 => strengths.pop(),
+        _ => None,
+    };
+    let strengths = strengths.into_iter().collect::<Result<Vec<Strength>, ForecastError>>()?;
     let factor = |k: usize| strengths[k.min(strengths.len() - 1)].peak.load_factor;
-    let [whole, known, worse] = [0, 1, 2].map(factor);
+    let [whole, known] = [0, 1].map(factor);
+    let worse = match worse {
+        Some(Ok(found)) => found.peak.load_factor,
+        Some(Err(ForecastError::Fails(_))) => 0.0,
+        Some(Err(other)) => return Err(other),
+        None => known,
+    };
     let told = &strengths[1.min(strengths.len() - 1)];
     let of_damage = (known - worse).max(0.0);
     let of_model = MODEL_ERROR.hypot(assumed_error(assembly)) * known;
@@ -206,8 +218,12 @@ fn strength(prepared: &Prepared, state: &str, job: &Job) -> Result<Strength, For
     let lived = analyze(prepared, MarchSettings::of_life(), job, &mut ());
     let (outcome, _) = lived.map_err(|why| failed(&why, job))?;
     let complaint = outcome.complaint;
-    outcome.strength.ok_or_else(|| {
-        ForecastError::Because(format!("{state} it does not bear what acts on it: {complaint}"))
+    let is_laborious = complaint == Failure::Laborious.to_string();
+    outcome.strength.ok_or_else(|| match is_laborious {
+        true => ForecastError::Because(format!("{state}: {complaint}")),
+        false => {
+            ForecastError::Fails(format!("{state} it does not carry what acts on it: {complaint}"))
+        }
     })
 }
 

@@ -82,7 +82,8 @@ fn one(site: &Site, zone: usize, shows: &Shows, rule: &GradingRule) -> Option<Es
     };
     match *shows {
         Shows::Crack { width_mm, std_error_mm, course, length_m } => {
-            let opened = (width_mm / rule.open_crack_mm).min(1.0);
+            let share_open = |width: f64| (width / rule.open_crack_mm).clamp(0.0, 1.0);
+            let opened = share_open(width_mm);
             let side = width.max(height);
             let share = match course {
                 // It runs along the bars, and takes nothing of what is pressed along.
@@ -92,7 +93,13 @@ fn one(site: &Site, zone: usize, shows: &Shows, rule: &GradingRule) -> Option<Es
                 }
             };
             let value = opened * share * DEPTH[0];
-            let error = std_error_mm / rule.open_crack_mm * share * DEPTH[0];
+            // Half the way between one standard error down and up: an error of a width that is wide
+            // open already changes nothing. What a net of cracks costs is uncertain by far more.
+            let apart = share_open(width_mm + std_error_mm) - share_open(width_mm - std_error_mm);
+            let error = match course {
+                Course::Map => 0.0,
+                _ => 0.5 * apart * share * DEPTH[0],
+            };
             Some(Estimate {
                 value,
                 std_error: (opened * share * DEPTH[1]).hypot(error).hypot(LOOKED),

@@ -2,7 +2,11 @@
 
 mod again;
 mod beforehand;
+mod cell;
 mod findings;
+#[cfg(test)]
+mod knobs;
+mod measured;
 pub mod photographed;
 mod rust;
 #[cfg(test)]

@@ -3,11 +3,9 @@
 //!
 //! | reading | likelihood | source |
 //! |---|---|---|
-//! | cover | normal about the drawing's cover and its deviation; 5 mm between bars | ours |
-//! | carbonation | normal about the front's depth; the model is 15 % off | ours |
-//! | chloride | normal about Fick's profile beneath what splashes; the model is 15 % off | ours |
+//! | cover, carbonation, chloride | none: they move what may be, see [`crate::measured`] | ours |
 //! | half-cell | 1/(1 + exp((E + 275 mV)/34.1 mV)) of rust: 10 % at −200, 90 % at −350 mV, never nearer to sure than 5 % | ASTM C876, appendix; logistic between, ours |
-//! | crack along | lognormal (.5) about w = .0575 mm⁻¹ (ΔA − ΔA₀), ΔA₀ at (7.53 + 9.32 c/φ) µm; one in ten has other causes | Vidal et al. 2004, Alonso et al. 1998; shares ours |
+//! | crack along | lognormal (.7) about w = .0575 mm⁻¹ (ΔA − ΔA₀), ΔA₀ at (7.53 + 9.32 c/φ) µm; one in ten has other causes, about .15 mm; wider than the model opens any of the bars' cracks counts as the widest of these | Vidal et al. 2004, Alonso et al. 1998; shares and spread ours |
 //! | intact | no crack that an eye finds: half of them at .15 mm; by a photograph, on the share of the surface that it shows, at the width that it could have shown | ours |
 //! | hollow | half of what is cracked to .4 mm | ours |
 //! | spall | half of what is cracked to 1 mm, the width taken as spalling | Vu, Stewart and Mullard 2005; curve ours |
@@ -20,8 +18,13 @@
 //!
 //! Readings of one kind in one zone err together by their model: of n of them each counts 1/n. Only
 //! of covers each speaks for itself.
+//!
+//! **Cost.** Readings are gathered by the zones that they lie in. Half-cell potentials are summed by
+//! their dates, exactly; of findings of one kind in one place equal ones count as one, and of more
+//! than [`MOST_SIGHTS`] different ones neighbours by size are pooled (approximate from there on).
+//! Work grows with the number of readings, and every step asks whether it is cancelled.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, sync::Arc};
 
 use intrados_damage::{
     evidence::Cause,
@@ -29,25 +32,28 @@ use intrados_damage::{
     zone::{ZONES, Zones},
 };
 use intrados_mechanics::material::durability::{Attack, Bars, Corrosion, Other};
-use intrados_scene::structure::{Course, Observation, Shows};
-use intrados_stage::{Estimate, random::Key, time::YEAR};
+use intrados_scene::structure::{Course, Date, Observation, Shows};
+use intrados_stage::{Cancelled, Estimate, Job, random::Key, time::YEAR};
 use serde_json::json;
 use statrs::distribution::{ContinuousCDF, Normal};
 
-use crate::site::{FORECAST_YEARS, HEARD, Placed, Site};
+use crate::{
+    cell::{ReadingCell, bars_of_cell, gather_cells},
+    measured::MeasuredState,
+    site::{FORECAST_YEARS, HEARD, Placed, Site},
+};
 
 /// Things that may be; the posterior of three readings that agree still rests on hundreds.
 pub(crate) const DRAWS: usize = 8192;
 /// So many of them the posterior must rest on (Kish's effective number); else all readings count by
 /// a smaller power.
 const LEAST: f64 = 50.0;
-/// Readings of which a share so large may be wrong in any way.
-const WRONG: f64 = 0.02;
-
-/// Between bars of one place, m.
-const COVER_LOCAL: f64 = 0.005;
 /// Of a front or profile, relative to itself.
-const MODEL: f64 = 0.15;
+pub(crate) const MODEL: f64 = 0.15;
+/// Different findings of one kind in one place; of more, neighbours are pooled.
+const MOST_SIGHTS: usize = 64;
+/// Dates that the course of rust is told for.
+const MOST_DATES: usize = 24;
 
 /// Share of all that may be in which something attacks that the class does not know of, and the
 /// share of the draws that are spent on it.
@@ -63,7 +69,7 @@ const SEED: u64 = 0x006c_6561_6b73;
 pub(crate) struct Possible {
     pub(crate) other: Other,
     /// Logarithm of its weight before anything is read.
-    prior: f64,
+    pub(crate) prior: f64,
 }
 
 /// All that may be of a corrosion, of steel that is `age` (s) old.
@@ -103,86 +109,119 @@ pub(crate) fn speaks(shows: &Shows) -> bool {
         && !matches!(shows, Shows::Crack { course, .. } if *course != Course::Along)
 }
 
+/// What may be in a zone, weighed.
+struct ZonePosterior {
+    draws: Arc<Vec<Possible>>,
+    /// They sum to one.
+    weights: Vec<f64>,
+    /// The share of bars' section that is gone.
+    lost: Estimate,
+    /// The probability that any rusts.
+    active: f64,
+}
+
 /// All that may be, weighed.
 pub(crate) struct Weighed {
-    draws: Vec<Possible>,
-    /// By zone: weights that sum to one; none where nothing is heard.
-    weights: [Option<Vec<f64>>; ZONES],
+    /// None where nothing is heard.
+    found: [Option<ZonePosterior>; ZONES],
     /// The smallest power that all readings of a zone had to be raised to.
     power: f64,
-    /// By zone, the share of bars' section that is gone, and the probability that any rusts.
-    found: [Option<(Estimate, f64)>; ZONES],
+    /// Readings far from what was expected, for people.
+    surprises: Vec<String>,
 }
 
 impl Weighed {
     /// Of the readings of a member; those that cannot be weighed become `unused`.
+    ///
+    /// # Errors
+    /// The job was cancelled.
     pub(crate) fn new(
         site: &Site,
         placed: &[Placed],
         profile: &Profile,
         unused: &mut BTreeMap<usize, String>,
-    ) -> Self {
-        let mut weighed = Self {
-            draws: Vec::new(),
-            weights: Default::default(),
-            power: 1.0,
-            found: [None; ZONES],
-        };
+        job: &Job,
+    ) -> Result<Self, Cancelled> {
+        let mut weighed =
+            Self { found: [const { None }; ZONES], power: 1.0, surprises: Vec::new() };
         let Ok(corrosion) = &site.corrosion else {
             let why = site.corrosion.as_ref().err().map_or("", String::as_str);
             for p in placed.iter().filter(|p| speaks(p.shows) && only_of_rust(p.shows)) {
                 unused.insert(p.number, format!("it speaks of rust, and {why}"));
             }
-            return weighed;
+            return Ok(weighed);
         };
-        let heard: Vec<&Placed> = placed.iter().filter(|p| speaks(p.shows)).collect();
-        let heard: Vec<&Placed> = heard
-            .into_iter()
-            .filter(|p| match deaf(site, corrosion, p) {
-                None => true,
-                Some(_) if !only_of_rust(p.shows) => false,
-                Some(why) => {
-                    unused.insert(p.number, why);
-                    false
-                }
-            })
-            .collect();
+        let mut heard: Vec<&Placed> = placed.iter().filter(|p| speaks(p.shows)).collect();
+        heard.retain(|p| match deaf(site, corrosion, p) {
+            None => true,
+            Some(_) if !only_of_rust(p.shows) => false,
+            Some(why) => {
+                unused.insert(p.number, why);
+                false
+            }
+        });
         if heard.is_empty() {
-            return weighed;
+            return Ok(weighed);
         }
-        weighed.draws = possible(corrosion, DRAWS, site.age);
-        let said: Vec<Vec<f64>> =
-            heard.iter().map(|p| logarithms(site, &weighed.draws, p)).collect();
+        let draws = Arc::new(possible(corrosion, DRAWS, site.age));
+        let cells = gather_cells(&heard);
+        let measured = MeasuredState::new(site, corrosion, &draws, &cells);
+        let gathered: Vec<GatheredCell> =
+            cells.iter().filter_map(|cell| GatheredCell::of(site, cell)).collect();
         let reach = profile.fusion.correlation_m.get(&Cause::Steel).copied().unwrap_or(1.0);
         for zone in 0..ZONES {
-            let powers: Vec<f64> =
-                heard.iter().map(|p| site.heard(p, zone, reach) / alike(&heard, p)).collect();
-            let loudest = powers.iter().copied().fold(0.0, f64::max);
-            if loudest < HEARD || site.bars[zone].is_empty() {
+            // Of many alike in one place each counts less, and all of them as one.
+            let loudest = cells.iter().map(|cell| site.heard(cell.zones, zone, reach));
+            if loudest.fold(0.0, f64::max) < HEARD || site.bars[zone].is_empty() {
                 continue;
             }
-            let sum = |k: usize| said.iter().zip(&powers).map(|(said, p)| p * said[k]).sum();
-            let logs: Vec<f64> = (0..weighed.draws.len()).map(sum).collect();
-            let priors: Vec<f64> = weighed.draws.iter().map(|draw| draw.prior).collect();
-            let (weights, power) = weights(&logs, &priors);
+            let own = match measured.moved(site, zone, reach, &draws, job)? {
+                Some(moved) => Arc::new(moved),
+                None => Arc::clone(&draws),
+            };
+            let priors: Vec<f64> = own.iter().map(|draw| draw.prior).collect();
+            let weights_of = |cracks: CracksAs| -> Result<(Vec<f64>, f64), Cancelled> {
+                let mut logs = vec![0.0; own.len()];
+                for cell in &gathered {
+                    let power = site.heard(cell.zones, zone, reach);
+                    cell.add(&own, power, cracks, &mut logs, job)?;
+                }
+                Ok(weights(&logs, &priors))
+            };
+            let (weights, power) = weights_of(CracksAs::Read)?;
             weighed.power = weighed.power.min(power);
-            weighed.found[zone] =
-                Some(posterior(&weighed.draws, &weights, &site.bars[zone], site.age));
-            weighed.weights[zone] = Some(weights);
+            let (mut lost, active) = posterior(&own, &weights, &site.bars[zone], site.age);
+            if gathered.iter().any(GatheredCell::has_cracks) {
+                // A somewhat wider crack speaks for some rust against much of it, which other causes
+                // may have opened: it must not say that less is lost than a hairline does.
+                let (weights, _) = weights_of(CracksAs::Hairlines)?;
+                let (least, _) = posterior(&own, &weights, &site.bars[zone], site.age);
+                if least.value > lost.value {
+                    lost = least;
+                }
+            }
+            weighed.found[zone] = Some(ZonePosterior { draws: own, weights, lost, active });
         }
-        weighed
+        weighed.surprises = measured.surprises;
+        Ok(weighed)
     }
 
     /// Share of the bars' section that is gone, by zone.
     pub(crate) fn zones(&self) -> Option<(Cause, Zones)> {
-        let zones = Zones(self.found.map(|found| found.map(|(lost, _)| lost)));
+        let zones = Zones(self.found.each_ref().map(|found| found.as_ref().map(|f| f.lost)));
         zones.worst().map(|_| (Cause::Steel, zones))
     }
 
     /// The zone where bars most probably rust, and how probably.
     pub(crate) fn worst(&self) -> Option<(usize, f64)> {
-        let known = self.found.iter().enumerate().filter_map(|(z, f)| Some((z, f.as_ref()?.1)));
+        let known =
+            self.found.iter().enumerate().filter_map(|(z, f)| Some((z, f.as_ref()?.active)));
         known.reduce(|worst, next| if next.1 > worst.1 { next } else { worst })
+    }
+
+    /// Readings far from what was expected, for people.
+    pub(crate) fn surprises(&self) -> &[String] {
+        &self.surprises
     }
 
     /// The power that readings count by where they contradict all that the class leaves open.
@@ -192,37 +231,53 @@ impl Weighed {
 
     /// Share that is gone in the worst zone at some age, s.
     fn at(&self, site: &Site, age: f64) -> Option<Estimate> {
-        let zones = self.weights.iter().zip(&site.bars).filter_map(|(weights, bars)| {
-            Some(posterior(&self.draws, weights.as_ref()?, bars, age).0)
+        let zones = self.found.iter().zip(&site.bars).filter_map(|(found, bars)| {
+            let found = found.as_ref()?;
+            Some(posterior(&found.draws, &found.weights, bars, age).0)
         });
         zones.reduce(|worst, next| if next.value > worst.value { next } else { worst })
     }
 
-    /// The course of rust over the dates of the observations and on, for scripts and plots.
-    pub(crate) fn details(&self, site: &Site, all: &[(usize, &Observation)]) -> serde_json::Value {
-        let mut dates: Vec<_> = all.iter().filter_map(|(_, o)| o.date).collect();
+    /// The course of rust over the dates of the observations and on, for scripts and plots; of
+    /// very many dates some.
+    pub(crate) fn details(
+        &self,
+        site: &Site,
+        all: &[(usize, &Observation)],
+        job: &Job,
+    ) -> Result<serde_json::Value, Cancelled> {
+        let mut dates: Vec<Date> = all.iter().filter_map(|(_, o)| o.date).collect();
         dates.sort_unstable();
         dates.dedup();
         let last = dates.last().copied();
         let point = |date: Option<String>, age: f64| {
-            let lost = self.at(site, age)?;
-            Some(json!({
-                "date": date, "age_years": age / YEAR, "steel_lost": lost.value, "std_error": lost.std_error,
+            job.check()?;
+            Ok(self.at(site, age).map(|lost| {
+                json!({
+                    "date": date, "age_years": age / YEAR,
+                    "steel_lost": lost.value, "std_error": lost.std_error,
+                })
             }))
         };
-        let then = dates.iter().filter_map(|date| {
-            let days = date.days_until(last?) as f64;
-            point(Some(date.to_string()), site.age - days * intrados_stage::time::DAY)
-        });
-        let ahead = site.age + FORECAST_YEARS * YEAR;
-        let now = if last.is_none() { point(None, site.age) } else { None };
-        let course: Vec<_> = then.chain(now).chain(point(None, ahead)).collect();
-        json!({
-            "probability_active": self.found.map(|f| f.map(|(_, active)| active)),
-            "power": self.power,
-            "course": course,
-        })
+        let mut course = Vec::new();
+        for date in some_of(&dates) {
+            let Some(last) = last else { break };
+            let before = date.days_until(last) as f64 * intrados_stage::time::DAY;
+            course.extend(point(Some(date.to_string()), site.age - before)?);
+        }
+        if last.is_none() {
+            course.extend(point(None, site.age)?);
+        }
+        course.extend(point(None, site.age + FORECAST_YEARS * YEAR)?);
+        let active = self.found.each_ref().map(|found| found.as_ref().map(|f| f.active));
+        Ok(json!({ "probability_active": active, "power": self.power, "course": course }))
     }
+}
+
+/// The first and the last date, and of many some between them.
+fn some_of(dates: &[Date]) -> impl Iterator<Item = &Date> {
+    let count = dates.len().min(MOST_DATES);
+    (0..count).map(move |k| &dates[k * (dates.len() - 1) / (count - 1).max(1)])
 }
 
 /// Why a profile of salt is not heard where the exposure class knows of none.
@@ -250,113 +305,228 @@ fn deaf(site: &Site, corrosion: &Corrosion, placed: &Placed) -> Option<String> {
     match placed.shows {
         Shows::Chloride { .. } if !by_salt => Some(NO_SALT.into()),
         Shows::Carbonation { .. } if !corrosion.carbonates() => Some(SALT_ALONE.into()),
-        _ if bars_at(site, placed).is_none() => {
+        _ if bars_of_cell(site, placed.zones).is_none() => {
             Some("no bars are known there: add them to the member's reinforcement".into())
         }
         _ => None,
     }
 }
 
-/// The bars with the least cover where it was made, and the concrete over the outermost steel.
-fn bars_at(site: &Site, placed: &Placed) -> Option<(Bars, f64)> {
-    let [from, to] = placed.zones;
-    let bars = (from..=to).flat_map(|zone| &site.bars[zone]).copied();
-    let least = bars.min_by(|a, b| a.cover.total_cmp(&b.cover))?;
-    let outer = (from..=to).filter_map(|zone| site.outer[zone]).fold(least.cover, f64::min);
-    Some((least, outer))
+/// Half-cell potentials of a place by the age at which they were read.
+#[derive(Default)]
+struct HalfCells {
+    /// Rising.
+    ages: Vec<f64>,
+    /// Of the readings before each, and after the last: sums of the logarithms of what they say of
+    /// bars that do not rust yet …
+    passive: Vec<f64>,
+    /// … and of bars that rust.
+    active: Vec<f64>,
 }
 
-/// How many of its kind lie in the same zones, where these err together.
-fn alike(heard: &[&Placed], one: &Placed) -> f64 {
-    if matches!(one.shows, Shows::Cover { .. }) {
-        return 1.0;
+impl HalfCells {
+    fn of(mut readings: Vec<[f64; 2]>) -> Self {
+        readings.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        let sums = |log: fn(f64) -> f64| {
+            let mut sum = 0.0;
+            let mut sums = vec![0.0];
+            sums.extend(readings.iter().map(|[_, rusts]| {
+                sum += log(*rusts);
+                sum
+            }));
+            sums
+        };
+        let (passive, active) = (sums(|rusts| (1.0 - rusts).ln()), sums(f64::ln));
+        Self { ages: readings.iter().map(|r| r[0]).collect(), passive, active }
     }
-    // What is intact at one face says nothing of another.
-    let is_beside = |p: &Placed| matches!(p.shows, Shows::Intact { .. }) && p.face != one.face;
-    let same =
-        |p: &&&Placed| p.shows.kind() == one.shows.kind() && p.zones == one.zones && !is_beside(p);
-    heard.iter().filter(same).count() as f64
+
+    /// Logarithm of the likelihood of all of them where rust began at an age.
+    fn log(&self, begun: f64) -> f64 {
+        let k = self.ages.partition_point(|age| *age <= begun);
+        self.passive[k] + self.active[self.active.len() - 1] - self.active[k]
+    }
 }
 
-/// The logarithm of the likelihood of a reading, for each thing that may be.
-fn logarithms(site: &Site, draws: &[Possible], placed: &Placed) -> Vec<f64> {
-    let Some((bars, outer)) = bars_at(site, placed) else { return vec![0.0; draws.len()] };
-    let age = (site.age - placed.before).max(0.0);
-    let shows = match *placed.shows {
-        Shows::Intact { seen, limit_mm } => {
-            Shows::Intact { seen: seen * placed.around(), limit_mm }
-        }
-        ref other => other.clone(),
-    };
-    draws.iter().map(|draw| logarithm(&shows, draw, &bars, outer, age)).collect()
+/// How cracks along bars count.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum CracksAs {
+    /// As wide as they were read.
+    Read,
+    /// As the finest that can be read.
+    Hairlines,
 }
 
-/// The same for one of them.
-fn logarithm(shows: &Shows, draw: &Possible, bars: &Bars, outer: f64, age: f64) -> f64 {
-    let width = || crack_mm(draw, bars, age);
-    let likelihood = match shows {
-        Shows::Cover { mm, std_error_mm } => {
-            let error = (1e-3 * std_error_mm).hypot(COVER_LOCAL);
-            return robust((1e-3 * mm - (outer + draw.other.cover).max(0.0)) / error);
+/// The finest crack that can be read, mm.
+const HAIRLINE: f64 = 0.01;
+
+/// A finding, or several that are alike.
+struct Sight {
+    shows: Shows,
+    /// Of the attack then, s.
+    age: f64,
+    /// How much of all of its kind in its place.
+    share: f64,
+}
+
+/// What is weighed of one place.
+struct GatheredCell {
+    zones: [usize; 2],
+    bars: Bars,
+    half_cells: HalfCells,
+    /// By age.
+    sights: Vec<Sight>,
+}
+
+/// What errs together in one place: readings of one kind; what is intact at one face says nothing
+/// of another.
+fn kind_of(p: &Placed) -> (&'static str, Option<u8>) {
+    match p.shows {
+        Shows::Intact { .. } => (p.shows.kind(), p.face),
+        _ => (p.shows.kind(), None),
+    }
+}
+
+impl GatheredCell {
+    fn of(site: &Site, cell: &ReadingCell) -> Option<Self> {
+        let (bars, _) = bars_of_cell(site, cell.zones)?;
+        let mut potentials = Vec::new();
+        let mut kinds: BTreeMap<(&str, Option<u8>), Vec<Sight>> = BTreeMap::new();
+        for p in &cell.readings {
+            let age = site.age_at(p);
+            let shows = match *p.shows {
+                Shows::HalfCell { mv, std_error_mv, .. } => {
+                    potentials.push([age, rusts(mv, std_error_mv)]);
+                    continue;
+                }
+                Shows::Cover { .. } | Shows::Carbonation { .. } | Shows::Chloride { .. } => {
+                    continue;
+                }
+                Shows::Intact { seen, limit_mm } => {
+                    Shows::Intact { seen: seen * p.around(), limit_mm }
+                }
+                ref other => other.clone(),
+            };
+            kinds.entry(kind_of(p)).or_default().push(Sight { shows, age, share: 1.0 });
         }
-        Shows::Carbonation { mm, std_error_mm } => {
-            let Some(front) = draw.other.front() else { return 0.0 };
-            let depth = 1e3 * front.depth(age);
-            let error = std_error_mm.hypot(MODEL * depth);
-            return robust((mm - depth) / error) - error.ln();
+        let mut sights: Vec<Sight> = kinds.into_values().flat_map(pooled).collect();
+        sights.sort_by(|a, b| a.age.total_cmp(&b.age));
+        Some(Self { zones: cell.zones, bars, half_cells: HalfCells::of(potentials), sights })
+    }
+
+    fn has_cracks(&self) -> bool {
+        self.sights.iter().any(|sight| matches!(sight.shows, Shows::Crack { .. }))
+    }
+
+    /// Adds what its readings say of each state, heard with some power.
+    fn add(
+        &self,
+        draws: &[Possible],
+        power: f64,
+        cracks: CracksAs,
+        logs: &mut [f64],
+        job: &Job,
+    ) -> Result<(), Cancelled> {
+        job.check()?;
+        let cover = self.bars.cover;
+        let count = self.half_cells.ages.len() as f64;
+        if count > 0.0 {
+            for (log, draw) in logs.iter_mut().zip(draws) {
+                *log += power / count * self.half_cells.log(draw.other.initiation(cover));
+            }
         }
-        Shows::Chloride { depths_mm, percent_of_cement, std_error_percent } => {
-            return chloride(&draw.other, depths_mm, percent_of_cement, *std_error_percent, age);
+        for sights in self.sights.chunk_by(|a, b| a.age.total_cmp(&b.age).is_eq()) {
+            let Some(age) = sights.first().map(|sight| sight.age) else { continue };
+            let states: Vec<(f64, bool)> = draws
+                .iter()
+                .map(|d| (crack_mm(d, &self.bars, age), d.other.is_active(cover, age)))
+                .collect();
+            let widest = widest_explained(&states);
+            for sight in sights {
+                job.check()?;
+                let likelihood = likelihood_of(&sight.shows, cracks, widest);
+                for (log, (width, active)) in logs.iter_mut().zip(&states) {
+                    *log += power * sight.share * likelihood(*width, *active).max(1e-300).ln();
+                }
+            }
         }
-        Shows::HalfCell { mv, std_error_mv, .. } => {
-            let rusts = rusts(*mv, *std_error_mv);
-            if draw.other.is_active(bars.cover, age) { rusts } else { 1.0 - rusts }
+        Ok(())
+    }
+}
+
+/// Findings of one kind in one place: equal ones as one, and of too many neighbours by size as one.
+/// Their shares sum to one.
+fn pooled(mut sights: Vec<Sight>) -> Vec<Sight> {
+    let count = sights.len().max(1) as f64;
+    sights.sort_by(|a, b| size(&a.shows).total_cmp(&size(&b.shows)).then(a.age.total_cmp(&b.age)));
+    let mut some: Vec<Sight> = Vec::new();
+    for sight in sights {
+        match some.last_mut() {
+            Some(last) if last.shows == sight.shows && last.age == sight.age => last.share += 1.0,
+            _ => some.push(sight),
         }
-        Shows::Crack { width_mm, std_error_mm, .. } => along(*width_mm, *std_error_mm, width()),
-        Shows::Intact { seen, limit_mm } => {
-            (1.0 - seen * half_at(width(), *limit_mm, 0.4)) * (1.0 - seen * OTHER_CAUSES)
+    }
+    let each = some.len().div_ceil(MOST_SIGHTS).max(1);
+    let mut pooled: Vec<Sight> = Vec::new();
+    let mut rest = some.into_iter().peekable();
+    while rest.peek().is_some() {
+        let group: Vec<Sight> = rest.by_ref().take(each).collect();
+        let share = group.iter().map(|sight| sight.share).sum::<f64>() / count;
+        let middle = group.len() / 2;
+        pooled.extend(group.into_iter().nth(middle).map(|sight| Sight { share, ..sight }));
+    }
+    pooled
+}
+
+/// What findings of one kind are sorted by.
+fn size(shows: &Shows) -> f64 {
+    match *shows {
+        Shows::Crack { width_mm, .. } => width_mm,
+        Shows::Intact { seen, .. } => -seen,
+        Shows::Sounding { hollow_m2, .. } => f64::from(u8::from(hollow_m2 > 0.0)),
+        Shows::Spall { bars_bare, .. } => f64::from(u8::from(bars_bare)),
+        _ => 0.0,
+    }
+}
+
+/// The widest crack that enough states open, mm: what is read beyond that speaks for these.
+fn widest_explained(states: &[(f64, bool)]) -> f64 {
+    let mut widths: Vec<f64> = states.iter().map(|s| s.0).filter(|w| *w > 0.0).collect();
+    widths.sort_by(f64::total_cmp);
+    let enough = 2 * LEAST as usize;
+    widths.len().checked_sub(enough).map_or(0.0, |k| widths[k]).max(OTHER_WIDTH)
+}
+
+/// The likelihood of a finding where rust has opened a crack of a width (mm), and where bars rust.
+fn likelihood_of(shows: &Shows, cracks: CracksAs, widest: f64) -> Box<dyn Fn(f64, bool) -> f64> {
+    match *shows {
+        Shows::Crack { width_mm, std_error_mm, .. } => {
+            let crack = CrackReading::new(width_mm, std_error_mm, widest);
+            let crack = match cracks {
+                CracksAs::Read => crack,
+                CracksAs::Hairlines => CrackReading { width: HAIRLINE, spread: WIDTH_SPREAD },
+            };
+            Box::new(move |width, _| crack.likelihood(width))
         }
-        Shows::Sounding { hollow_m2, tapped_m2 } => {
-            let hollow = 0.03 + 0.94 * half_at(width(), 0.4, 0.5);
-            let share = (hollow_m2 / tapped_m2.max(1e-9)).clamp(0.0, 1.0);
+        Shows::Intact { seen, limit_mm } => Box::new(move |width, _| {
+            (1.0 - seen * half_at(width, limit_mm, 0.4)) * (1.0 - seen * OTHER_CAUSES)
+        }),
+        Shows::Sounding { hollow_m2, .. } => Box::new(move |width, _| {
+            let hollow = 0.03 + 0.94 * half_at(width, 0.4, 0.5);
             // A hollow spot is one reading, however small beside what was tapped.
-            if share > 0.0 { hollow } else { 1.0 - hollow }
-        }
+            if hollow_m2 > 0.0 { hollow } else { 1.0 - hollow }
+        }),
         Shows::Spall { bars_bare, .. } => {
-            let background = if *bars_bare { 0.01 } else { 0.03 };
-            background + 0.9 * half_at(width(), 1.0, 0.4)
+            let background = if bars_bare { 0.01 } else { 0.03 };
+            Box::new(move |width, _| background + 0.9 * half_at(width, 1.0, 0.4))
         }
-        Shows::Rust { .. } => {
-            let active = f64::from(u8::from(draw.other.is_active(bars.cover, age)));
-            0.03 + 0.15 * active + 0.6 * half_at(width(), 0.2, 0.5)
-        }
+        Shows::Rust { .. } => Box::new(|width, active| {
+            0.03 + 0.15 * f64::from(u8::from(active)) + 0.6 * half_at(width, 0.2, 0.5)
+        }),
         Shows::Efflorescence { .. } | Shows::WetSpot { .. } => {
-            if draw.other.is_active(bars.cover, age) { 0.3 } else { 0.2 }
+            Box::new(|_, active| if active { 0.3 } else { 0.2 })
         }
-        Shows::Rebound { .. } | Shows::Velocity { .. } | Shows::CoreStrength { .. } => 1.0,
-    };
-    likelihood.max(1e-300).ln()
-}
-
-/// Normal, with some readings that are wrong.
-fn robust(z: f64) -> f64 {
-    ((1.0 - WRONG) * (-0.5 * z * z).exp() + WRONG * 0.1).ln()
-}
-
-/// A profile against Fick's, beneath what splashes; two numbers of the model are learnt of it, so
-/// that it counts as two readings however many samples it has.
-fn chloride(draw: &Other, depths_mm: &[f64], percent: &[f64], error: f64, age: f64) -> f64 {
-    let Attack::Chloride { ingress, convection, .. } = &draw.attack else { return 0.0 };
-    let beneath = depths_mm.iter().zip(percent).filter(|(mm, _)| 1e-3 * **mm > *convection);
-    let mut count = 0.0;
-    let mut sum = 0.0;
-    for (mm, percent) in beneath {
-        let content = ingress.content(1e-3 * mm - convection, age);
-        let error = error.hypot(MODEL * content);
-        sum += robust((percent - content) / error) - error.ln();
-        count += 1.0;
+        _ => Box::new(|_, _| 1.0),
     }
-    if count > 2.0 { sum * 2.0 / count } else { sum }
 }
 
 /// Probability of rust where a potential (mV against Cu/CuSO₄) was read.
@@ -366,17 +536,42 @@ pub(crate) fn rusts(mv: f64, error: f64) -> f64 {
     (1.0 / (1.0 + ((mv + 275.0) / scale).exp())).clamp(0.05, 0.95)
 }
 
-/// Share of cracks along that rust has nothing to do with.
+/// Share of cracks along that rust has nothing to do with: settling and shrinkage leave some of a
+/// few tenths, mm.
 const OTHER_CAUSES: f64 = 0.1;
+const OTHER_WIDTH: f64 = 0.15;
+/// Deviation of the logarithm of a crack's width about what rust or another cause opens. One for
+/// both: the wider a crack, the less another cause explains it, at every width.
+const WIDTH_SPREAD: f64 = 0.7;
 
-/// Likelihood of a crack along of width w where rust makes one of `rust` mm.
-fn along(width: f64, error: f64, rust: f64) -> f64 {
-    let spread = 0.5_f64.hypot(error / width.max(0.01));
-    let z = (width.max(0.01) / rust.max(1e-6)).ln() / spread;
-    let of_rust = (-0.5 * z * z).exp() / (spread * width.max(0.01) * 2.506_628);
-    // Settling and shrinkage leave cracks of a few tenths.
-    let of_others = (-width / 0.2).exp() / 0.2;
-    half_at(rust, 0.15, 0.4) * of_rust + OTHER_CAUSES * of_others
+/// Width to which the error of a reading is relative at least, mm: relative to a fine crack it would
+/// make it say nothing, and a somewhat wider one speak for other causes.
+const ERROR_WIDTH: f64 = 1.0;
+
+/// A crack along bars, as it was read.
+struct CrackReading {
+    /// mm.
+    width: f64,
+    /// Deviation of the logarithm of a width, by what opens cracks and by the reading.
+    spread: f64,
+}
+
+impl CrackReading {
+    /// `widest`: what is read beyond that speaks for no more.
+    fn new(width: f64, error: f64, widest: f64) -> Self {
+        let spread = WIDTH_SPREAD.hypot(error / width.max(ERROR_WIDTH));
+        Self { width: width.clamp(HAIRLINE, widest.max(HAIRLINE)), spread }
+    }
+
+    /// Where rust has opened a crack of `rust` mm.
+    fn likelihood(&self, rust: f64) -> f64 {
+        let density = |about: f64| {
+            let z = (self.width / about).ln() / self.spread;
+            (-0.5 * z * z).exp() / (self.spread * self.width * 2.506_628)
+        };
+        let of_rust = half_at(rust, 0.15, 0.4) * density(rust.max(OTHER_WIDTH));
+        of_rust + OTHER_CAUSES * density(OTHER_WIDTH)
+    }
 }
 
 /// A curve that rises from nothing to one about a width, mm; `spread` of its logarithm.

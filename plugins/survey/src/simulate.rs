@@ -11,7 +11,7 @@ use intrados_damage::{
 };
 use intrados_mechanics::material::durability::{Attack, Bars, Corrosion};
 use intrados_scene::structure::{Course, Electrode, Shows, usual};
-use intrados_stage::{Estimate, random::Key, time::YEAR};
+use intrados_stage::{Estimate, Job, random::Key, time::YEAR};
 use statrs::distribution::{Beta, ContinuousCDF, Normal};
 
 use crate::{
@@ -19,7 +19,7 @@ use crate::{
     rust::{self, Possible},
     site::{Placed, Site},
     strength::{self, Concrete},
-    weighed::{SURVEY, Said},
+    weighed::{SURVEY, Said, shrunk},
 };
 
 /// Plantings a kind.
@@ -60,6 +60,7 @@ fn site(corrosion: Corrosion) -> Site {
         bars: std::array::from_fn(|zone| if zone == ZONE { vec![bars] } else { Vec::new() }),
         outer: [Some(cover - 0.008); ZONES],
         age: AGE,
+        is_steel_assumed: false,
         length: 10.0,
         sides: [0.4, 0.6],
     }
@@ -167,7 +168,14 @@ fn intervals_of_rust_hold_the_planted_share() {
         });
         let (mut held, mut error, mut count) = (0.0, 0.0, 0.0);
         for (truth, shows) in seen.take(PLANTINGS as usize) {
-            let said = rust::Weighed::new(&site, &placed(&shows), &profile, &mut BTreeMap::new());
+            let said = rust::Weighed::new(
+                &site,
+                &placed(&shows),
+                &profile,
+                &mut BTreeMap::new(),
+                &Job::default(),
+            )
+            .unwrap();
             let (Cause::Steel, Zones(zones)) = said.zones().unwrap() else { panic!() };
             let found = zones[ZONE].unwrap();
             held += f64::from(u8::from(holds(found, truth.other.lost(&[bars], AGE).0)));
@@ -302,7 +310,8 @@ impl Honeycomb {
         let shows = velocity(&sound, lost, dice);
         let mut said = Said::default();
         let site = site(Corrosion::of_class("XD3", 30e6, 283.15).unwrap());
-        said.put(Cause::Stiffness, &strength::stiffness(&sound, &placed(&shows)), profile, &site);
+        let read = strength::stiffness(&sound, &placed(&shows));
+        said.put(Cause::Stiffness, &shrunk(&read, Cause::Stiffness, profile), profile, &site);
         let pulse = said.evidence(SURVEY, String::new()).unwrap();
         Self { concrete, stiffness, slices: slices.unwrap(), pulse }
     }

@@ -43,6 +43,8 @@ pub(crate) struct Site {
     pub(crate) outer: [Option<f64>; ZONES],
     /// Since the attack began, at the time of the last observation, s.
     pub(crate) age: f64,
+    /// Whether its bars, and so their cover, were only assumed.
+    pub(crate) is_steel_assumed: bool,
     /// m.
     pub(crate) length: f64,
     /// Sides of its section, m.
@@ -63,6 +65,10 @@ impl Site {
             bars: Default::default(),
             outer: [None; ZONES],
             age: 0.0,
+            is_steel_assumed: scene
+                .structure
+                .assembly_of(&member.id)
+                .is_some_and(|assembly| assembly.steel_assumed),
             length,
             sides: [least, (area / least).max(least)],
         }
@@ -77,10 +83,14 @@ impl Site {
         }
     }
 
-    /// How far an observation is heard in a zone, 0 to 1.
-    pub(crate) fn heard(&self, placed: &Placed, zone: usize, reach_m: f64) -> f64 {
+    /// Age of the attack when an observation was made, s.
+    pub(crate) fn age_at(&self, placed: &Placed) -> f64 {
+        (self.age - placed.before).max(0.0)
+    }
+
+    /// How far an observation of some zones is heard in a zone, 0 to 1.
+    pub(crate) fn heard(&self, [from, to]: [usize; 2], zone: usize, reach_m: f64) -> f64 {
         let far = |zones: f64| (-zones * self.length / ZONES as f64 / reach_m.max(1e-6)).exp();
-        let [from, to] = placed.zones;
         far(from.saturating_sub(zone).max(zone.saturating_sub(to)) as f64)
     }
 }

@@ -11,7 +11,7 @@
 //! raised to the power exp(−r/L), L the profile's length along which damage is alike (power prior,
 //! Ibrahim and Chen 2000).
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use intrados_damage::{
     evidence::{Cause, Evidence},
@@ -24,7 +24,7 @@ use intrados_scene::{
     Scene,
     structure::{Date, Observation},
 };
-use intrados_stage::{Estimate, Job, time::DAY};
+use intrados_stage::{Cancelled, Estimate, Job, time::DAY};
 use serde_json::json;
 
 use crate::{
@@ -79,18 +79,19 @@ pub fn surveyed(
         match forecast::bars_of(scene, model, &profile.rule, job) {
             Ok(known) => site.take(known, &member.id),
             Err(ForecastError::Cancelled) => return Err(ForecastError::Cancelled),
-            Err(ForecastError::Because(why)) => site.corrosion = Err(why),
+            Err(why) => site.corrosion = Err(why.to_string()),
         }
     }
-    let steel = rust::Weighed::new(&site, &placed, profile, &mut said.unused);
+    let steel = rust::Weighed::new(&site, &placed, profile, &mut said.unused, job)?;
     said.zones.extend(steel.zones());
     let concrete = strength::Concrete::of(scene, index);
-    said.put(Cause::Stiffness, &strength::stiffness(&concrete, &placed), profile, &site);
-    let strengths = strength::strength(&concrete, &placed);
+    let stiffness = shrunk(&strength::stiffness(&concrete, &placed), Cause::Stiffness, profile);
+    said.put(Cause::Stiffness, &stiffness, profile, &site);
+    let strengths = shrunk(&strength::strength(&concrete, &placed), Cause::Concrete, profile);
     // Of what was found again the latest counts.
     let seen: Vec<&Observation> = all.iter().map(|(_, o)| *o).collect();
     let is_old = is_superseded(&seen, site.length);
-    let old: Vec<usize> =
+    let old: BTreeSet<usize> =
         all.iter().zip(is_old).filter(|(_, old)| *old).map(|((number, _), _)| *number).collect();
     let is_current = |p: &&Placed| !old.contains(&p.number);
     let current: Vec<Placed> = placed.iter().filter(is_current).map(|p| Placed { ..*p }).collect();
@@ -108,8 +109,8 @@ pub fn surveyed(
     evidence.crack_width_mm = findings::widest(&current);
     if let serde_json::Value::Object(details) = json!({
         "observations": used.len(),
-        "rust": steel.details(&site, &all),
-        "rust_before_the_last_inspection": before_the_last(&site, &placed, profile),
+        "rust": steel.details(&site, &all, job)?,
+        "rust_before_the_last_inspection": before_the_last(&site, &placed, profile, job)?,
     }) {
         evidence.details = details;
     }
@@ -126,15 +127,19 @@ pub fn of_member<'a>(
 
 /// The share of steel that was taken for lost, in the worst zone and as of now, before what was
 /// found last: what has changed since. None of one date alone.
-fn before_the_last(site: &Site, placed: &[Placed], profile: &Profile) -> Option<Estimate> {
+fn before_the_last(
+    site: &Site,
+    placed: &[Placed],
+    profile: &Profile,
+    job: &Job,
+) -> Result<Option<Estimate>, Cancelled> {
     let earlier: Vec<Placed> =
         placed.iter().filter(|p| p.before > 0.0).map(|p| Placed { ..*p }).collect();
     if earlier.is_empty() {
-        return None;
+        return Ok(None);
     }
-    let weighed = rust::Weighed::new(site, &earlier, profile, &mut BTreeMap::new());
-    let (_, zones) = weighed.zones()?;
-    zones.worst().map(|(_, lost)| lost)
+    let weighed = rust::Weighed::new(site, &earlier, profile, &mut BTreeMap::new(), job)?;
+    Ok(weighed.zones().and_then(|(_, zones)| zones.worst()).map(|(_, lost)| lost))
 }
 
 /// Where and how long before the last each was made. Without a date it is as of the last.
@@ -177,6 +182,20 @@ fn together(strengths: &ByZone, findings: &ByZone) -> ByZone {
     })
 }
 
+/// What instruments say of a cause, of which one that says less than what was expected beforehand
+/// counts by its share of that (Bayes, normal about nothing).
+pub(crate) fn shrunk(said: &ByZone, cause: Cause, profile: &Profile) -> ByZone {
+    let prior = Field::of(profile, cause, 1.0).sd;
+    said.map(|reading| {
+        let Estimate { value, std_error } = reading?;
+        if std_error <= prior {
+            return reading;
+        }
+        let share = prior.powi(2) / (prior.powi(2) + std_error.powi(2));
+        Some(Estimate { value: share * value, std_error: share.sqrt() * std_error })
+    })
+}
+
 /// What is said so far.
 #[derive(Default)]
 pub(crate) struct Said {
@@ -189,18 +208,12 @@ impl Said {
     /// What is said of a cause in some zones, spread along the member.
     pub(crate) fn put(&mut self, cause: Cause, said: &ByZone, profile: &Profile, site: &Site) {
         let field = Field::of(profile, cause, site.length);
-        // A zone's own word counts in full; one that says less than what was expected beforehand
-        // must not leave the zone less known than that.
-        let weighed = |reading: Estimate| match reading.std_error > field.sd {
-            true => {
-                let share = field.sd.powi(2) / (field.sd.powi(2) + reading.std_error.powi(2));
-                let std_error = share.sqrt() * reading.std_error;
-                Estimate { value: share * reading.value, std_error }
-            }
-            false => reading,
-        };
+        // What was found counts in full: it must not leave its zone less known than before, but
+        // being hard to tell makes it no smaller.
+        let capped =
+            |reading: Estimate| Estimate { std_error: reading.std_error.min(field.sd), ..reading };
         let word = |(zone, reading): (usize, &Option<Estimate>)| {
-            Some(Word { along: Some(middle(zone)), reading: weighed((*reading)?), core: zone })
+            Some(Word { along: Some(middle(zone)), reading: capped((*reading)?), core: zone })
         };
         let words: Vec<Word> = said.iter().enumerate().filter_map(word).collect();
         if words.is_empty() {
@@ -242,6 +255,9 @@ fn basis(used: &[&Placed], steel: &rust::Weighed) -> String {
             100.0 * active,
             place(zone)
         );
+    }
+    for surprise in steel.surprises() {
+        text += &format!("; {surprise}");
     }
     if let Some(power) = steel.tempered() {
         text += &format!(

@@ -325,7 +325,8 @@ impl Other {
     }
 
     /// When steel under a cover of the drawing (m) begins to rust, s after the attack began.
-    fn initiation(&self, cover: f64) -> f64 {
+    #[must_use]
+    pub fn initiation(&self, cover: f64) -> f64 {
         let [by_attack, beside] = self.fronts(cover);
         self.since.unwrap_or(by_attack.min(beside))
     }
