@@ -64,6 +64,47 @@ pub struct Stands {
     pub prior: Option<f64>,
 }
 
+/// A computed life that ends: the member does not carry what acts on it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LifeEnd {
+    /// Age of the member then, years.
+    pub age_years: f64,
+    /// Years from now; 0 if its life has ended before.
+    pub ahead_years: f64,
+    /// Why, one line.
+    pub why: String,
+    /// What the computation rests on that was only assumed; empty if all of it is stated.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub assumed: Vec<String>,
+}
+
+impl LifeEnd {
+    /// One sentence for people, which names what was assumed.
+    #[must_use]
+    pub fn sentence(&self) -> String {
+        let when = match (self.age_years, self.ahead_years) {
+            (_, ahead) if ahead > 0.0 => {
+                format!(
+                    "fails in year {:.0} of its life, {ahead:.0} years from now",
+                    self.age_years
+                )
+            }
+            (age, _) if age < 2.0 => format!("fails on day {:.0} of its life", 365.25 * age),
+            (age, _) => format!("fails in year {age:.0} of its life"),
+        };
+        let assumed = match self.assumed.is_empty() {
+            true => String::new(),
+            false => format!(" (its {} only assumed)", self.are_assumed()),
+        };
+        format!("By computation it {when}{assumed}: {}", self.why)
+    }
+
+    fn are_assumed(&self) -> String {
+        let verb = if self.assumed.len() == 1 { "is" } else { "are" };
+        format!("{} {verb}", self.assumed.join(" and "))
+    }
+}
+
 /// What one physics says of one member.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Evidence {
@@ -92,6 +133,9 @@ pub struct Evidence {
     pub basis: String,
     /// Widest crack that it knows of, mm.
     pub crack_width_mm: Option<f64>,
+    /// How its computed life ends; `None` if it does not.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub failure: Option<LifeEnd>,
     /// Further numbers, for scripts.
     pub details: serde_json::Map<String, serde_json::Value>,
 }
@@ -120,6 +164,7 @@ impl Evidence {
             measured,
             basis,
             crack_width_mm: None,
+            failure: None,
             details,
         })
     }

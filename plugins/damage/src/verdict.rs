@@ -9,7 +9,13 @@
 //!
 //! What follows from that: nothing unknown is called sound, and nothing unknown is called poor.
 //! Where nothing was found and the best estimate is sound, the error bar is wide because nobody has
-//! looked enough, and what is to be done is to look.
+//! looked enough, and what is to be done is to look. Where cracks were found that the exposure class
+//! admits, they are to be watched.
+//!
+//! *At once* has to be earned: the worst state calls for it where it is as likely as [`CALLED`], and
+//! not where an error bar merely reaches it. Of a member that was never looked at the worst state
+//! counts that it has, or worse, as likely as not. A life that ends by computation
+//! ([`Verdict::failing`]) is the worst of all.
 
 use intrados_stage::Estimate;
 use std::collections::BTreeMap;
@@ -18,15 +24,17 @@ use serde::Serialize;
 use statrs::function::erf::erfc;
 
 use crate::{
-    evidence::Evidence,
+    evidence::{Evidence, LifeEnd},
     grading::{NO_EVIDENCE, Profile, State},
     zone::ZONES,
 };
 
 /// Probability from which a state, or a run of neighbouring states, is named.
 pub const NAMED: f64 = 0.8;
-/// Probability of being severe from which scores take a member as called severe, named or not.
+/// Probability of being severe from which a member is called severe, named or not.
 pub(crate) const CALLED: f64 = 0.5;
+/// Damage that readings beside an admitted crack may add before something else was found (ours).
+const ADMITTED_MARGIN: f64 = 0.03;
 
 /// What a statement rests on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
@@ -81,17 +89,26 @@ pub struct Looked {
     pub found: bool,
     /// Share of its length that nobody has measured or seen, 0 to 1.
     pub unseen: f64,
+    /// The widest crack that was found and what is admitted, mm, where no crack is wider than that.
+    pub admitted: Option<[f64; 2]>,
 }
 
 impl Looked {
     /// Nobody has looked at anything.
-    pub const NOWHERE: Self = Self { found: false, unseen: 1.0 };
+    pub const NOWHERE: Self = Self { found: false, unseen: 1.0, admitted: None };
 
     /// By what is said of a member: a place counts as looked at where somebody measured or saw it,
-    /// and not where the word of another place reaches. A crack that was measured was found, and so
-    /// was a damage that the profile does not call sound, and a defect that somebody has listed.
+    /// and not where the word of another place reaches. A crack that was measured was found if it is
+    /// wider than `limit_mm`, which the exposure class admits, and so was a damage that the profile
+    /// does not call sound (and that admitted cracks do not explain), and a defect that somebody has
+    /// listed, `is_listed`.
     #[must_use]
-    pub fn of(profile: &Profile, evidence: &[&Evidence], is_listed: bool) -> Self {
+    pub fn of(
+        profile: &Profile,
+        evidence: &[&Evidence],
+        is_listed: bool,
+        limit_mm: Option<f64>,
+    ) -> Self {
         let measured = || evidence.iter().filter(|e| e.measured);
         let own = |e: &Evidence, zone: usize| {
             e.zones.iter().any(|(cause, zones)| {
@@ -101,13 +118,26 @@ impl Looked {
         };
         let is_unseen = |&zone: &usize| !measured().any(|e| own(e, zone));
         let unseen = (0..ZONES).filter(is_unseen).count();
-        let damaged = |e: &Evidence| {
-            let zones = e.by_zone().0;
-            zones.iter().flatten().any(|d| d.value >= profile.damaged_from())
+        let limit = limit_mm.unwrap_or(0.0);
+        let admitted = |e: &Evidence| e.crack_width_mm.filter(|w| *w > 0.0 && *w <= limit);
+        // What a crack of unknown depth costs by the profile's rule: half of the section, by its
+        // width.
+        let explained = |e: &Evidence| {
+            let open = admitted(e).map(|w| (w / profile.rule.open_crack_mm).min(1.0));
+            open.map_or(0.0, |open| 0.5 * open + ADMITTED_MARGIN)
         };
-        let found = |e: &Evidence| e.crack_width_mm.is_some_and(|w| w > 0.0) || damaged(e);
+        let damaged = |e: &Evidence| {
+            let from = profile.damaged_from().max(explained(e));
+            e.by_zone().0.iter().flatten().any(|d| d.value >= from)
+        };
+        let found = |e: &Evidence| e.crack_width_mm.is_some_and(|w| w > limit) || damaged(e);
         let found = is_listed || measured().any(|e| found(e));
-        Self { found, unseen: unseen as f64 / ZONES as f64 }
+        let widest = measured().filter_map(|e| admitted(e)).reduce(f64::max);
+        Self {
+            found,
+            unseen: unseen as f64 / ZONES as f64,
+            admitted: widest.filter(|_| !found).map(|w| [w, limit]),
+        }
     }
 }
 
@@ -159,8 +189,15 @@ impl Verdict {
         let [best, worst] = run(&likely);
         let widest = cracks.iter().map(|w| w.value).fold(0.0, f64::max);
         let is_settled = basis == Basis::Measured && best == worst;
-        let is_probably_sound = profile.state(damage.value, widest) == profile.states.first();
-        let to_inspect = is_probably_sound && !looked.found && !is_settled;
+        let state = profile.state(damage.value, widest);
+        let is_probably_sound = state == profile.states.first();
+        let is_admitted =
+            looked.admitted.is_some() && profile.states.iter().take(2).any(|s| Some(s) == state);
+        let to_inspect = (is_probably_sound || is_admitted) && !looked.found && !is_settled;
+        if let Some(admitted) = looked.admitted.filter(|_| to_inspect) {
+            return Self::watched(profile, &likely, basis, looked.unseen, admitted);
+        }
+        let urgent = urgent(&likely, [best, worst], basis);
         let name = |k: usize| profile.states[k].name.as_str();
         let said = if best == worst {
             name(best).to_owned()
@@ -180,14 +217,97 @@ impl Verdict {
             advice: if to_inspect {
                 inspection(basis, looked)
             } else {
-                advice(profile, [best, worst], basis)
+                advice(profile, [best, worst], urgent, basis)
             },
             within_months: if to_inspect {
                 profile.inspect_within_months
             } else {
-                profile.states[worst].within_months
+                let months = profile.states[urgent].within_months;
+                match basis {
+                    // To look is the first thing to do.
+                    Basis::Forecast => sooner(months, profile.inspect_within_months),
+                    _ => months,
+                }
             },
             to_inspect,
+        }
+    }
+
+    /// Of a member on which only cracks were found that its exposure class admits.
+    fn watched(
+        profile: &Profile,
+        likely: &[f64],
+        basis: Basis,
+        unseen: f64,
+        [width, limit]: [f64; 2],
+    ) -> Self {
+        let names = || profile.states.iter().map(|s| s.name.as_str());
+        let said: Vec<&str> = names().take(2).collect();
+        let percent = (100.0 * unseen).round();
+        let rest = match percent > 0.0 {
+            true => format!("; {percent} % of the length has not been looked at"),
+            false => String::new(),
+        };
+        let months = profile.states.get(1).and_then(|s| s.within_months);
+        let months =
+            if percent > 0.0 { sooner(months, profile.inspect_within_months) } else { months };
+        Self {
+            state: match said[..] {
+                [sound, fair] => format!("between {sound} and {fair}"),
+                _ => said.concat(),
+            },
+            probability: names().map(str::to_owned).zip(likely.iter().copied()).collect(),
+            run: Some([0, said.len().saturating_sub(1)]),
+            basis,
+            advice: format!(
+                "Monitor: cracks up to {width:.2} mm are within the {limit:.2} mm that its exposure class admits{rest}. Look again at the next inspection."
+            ),
+            within_months: months,
+            to_inspect: true,
+        }
+    }
+
+    /// The same of a member whose computed life ends: it is in the worst state, whatever was seen.
+    #[must_use]
+    pub fn failing(self, profile: &Profile, end: &LifeEnd) -> Self {
+        let (Some(worst), last) = (profile.states.last(), profile.states.len() - 1) else {
+            return self;
+        };
+        let basis = if self.basis == Basis::None { Basis::Forecast } else { self.basis };
+        let is_past = end.ahead_years <= 0.0;
+        let before = profile.states[..last].last().and_then(|s| s.within_months);
+        // At least as likely as a state has to be to be named; the rest as it was.
+        let was = self.probability.get(&worst.name).copied().unwrap_or(0.0);
+        let (now, others) = (was.max(NAMED), 1.0 - was);
+        let share = if others > 0.0 { (1.0 - now) / others } else { 0.0 };
+        let probability = profile.states.iter().map(|state| {
+            let known = self.probability.get(&state.name).copied();
+            let p = if state == worst { now } else { share * known.unwrap_or(0.0) };
+            (state.name.clone(), p)
+        });
+        let probability: BTreeMap<String, f64> = match self.probability.is_empty() {
+            false => probability.collect(),
+            true => profile
+                .states
+                .iter()
+                .map(|s| (s.name.clone(), if s == worst { 1.0 } else { 0.0 }))
+                .collect(),
+        };
+        Self {
+            state: match basis {
+                Basis::Forecast => format!("forecast: {}", worst.name),
+                _ => worst.name.clone(),
+            },
+            probability,
+            run: Some([last, last]),
+            basis,
+            advice: format!("{}. {}", end.sentence().trim_end_matches('.'), worst.advice),
+            within_months: if is_past {
+                worst.within_months
+            } else {
+                sooner(before, self.within_months)
+            },
+            to_inspect: false,
         }
     }
 
@@ -197,6 +317,26 @@ impl Verdict {
     pub(crate) fn is_settled(&self) -> bool {
         self.basis == Basis::Measured && self.run.is_some_and(|[best, worst]| best == worst)
     }
+}
+
+/// The sooner of two times.
+fn sooner(a: Option<u32>, b: Option<u32>) -> Option<u32> {
+    match (a, b) {
+        (Some(a), Some(b)) => Some(a.min(b)),
+        (a, b) => a.or(b),
+    }
+}
+
+/// The state by which it is urgent: the worst that it may be in, but the worst of all only where it
+/// is likely enough; of a member that was never looked at the worst that it has, or worse, as
+/// likely as not.
+fn urgent(likely: &[f64], [best, worst]: [usize; 2], basis: Basis) -> usize {
+    let at_least = |k: usize| likely[k..].iter().sum::<f64>();
+    if basis == Basis::Forecast {
+        return (0..=worst).rev().find(|&k| at_least(k) >= CALLED).unwrap_or(0);
+    }
+    let is_last = worst + 1 == likely.len();
+    if is_last && at_least(worst) < CALLED { worst.saturating_sub(1).max(best) } else { worst }
 }
 
 /// Where nothing was found and what is most probable is sound: what is not known is no damage, and
@@ -215,8 +355,8 @@ fn inspection(basis: Basis, looked: Looked) -> String {
 
 /// That of the state where it is settled; else to look, and until then to do what the worst of what
 /// may be asks for.
-fn advice(profile: &Profile, [best, worst]: [usize; 2], basis: Basis) -> String {
-    let state = &profile.states[worst];
+fn advice(profile: &Profile, [best, worst]: [usize; 2], urgent: usize, basis: Basis) -> String {
+    let state = &profile.states[urgent];
     if best == worst && basis == Basis::Measured {
         return state.advice.clone();
     }
@@ -228,7 +368,7 @@ fn advice(profile: &Profile, [best, worst]: [usize; 2], basis: Basis) -> String 
             "Inspect: nothing was measured on it, and the forecast expects damage; an inspection, cores or gauges under a load test would show."
         }
     };
-    if worst == 0 {
+    if urgent == 0 {
         look.to_owned()
     } else {
         let mut todo = state.advice.chars();
@@ -351,7 +491,7 @@ mod tests {
     #[test]
     fn a_state_is_named_when_it_is_likely_enough() {
         let profile = Profile::default();
-        let looked = Looked { found: true, unseen: 0.0 };
+        let looked = Looked { found: true, unseen: 0.0, admitted: None };
         let of =
             |d: f64, s: f64, basis| Verdict::of(&profile, Some(reading(d, s)), &[], basis, looked);
         let sound = of(0.0, 0.03, Basis::Measured);
@@ -388,7 +528,7 @@ mod tests {
     #[test]
     fn cracks_have_errors_too() {
         let profile = Profile::default();
-        let looked = Looked { found: true, unseen: 0.0 };
+        let looked = Looked { found: true, unseen: 0.0, admitted: None };
         let of = |w: f64, s: f64| {
             let crack = [reading(w, s)];
             Verdict::of(&profile, Some(reading(0.0, 0.02)), &crack, Basis::Measured, looked)
@@ -418,7 +558,7 @@ mod tests {
         let of = |damage, cracks: &[Estimate], basis, looked| {
             Verdict::of(&profile, Some(damage), cracks, basis, looked)
         };
-        let half = Looked { found: false, unseen: 0.5 };
+        let half = Looked { found: false, unseen: 0.5, admitted: None };
         let seen = of(reading(0.0, 0.24), &[], Basis::Measured, half);
         assert!(seen.to_inspect && seen.state == "between sound and poor");
         assert_eq!(
@@ -432,17 +572,104 @@ mod tests {
         // What is settled needs no inspection of its own.
         let settled = of(reading(0.0, 0.03), &[], Basis::Measured, half);
         assert!(!settled.to_inspect && settled.within_months == Some(72));
-        // Damage that was found, is more probable than not, or cracks that are forecast count as
-        // before.
+        // Damage that was found, or is more probable than not, counts as before.
         let found = Looked { found: true, ..half };
         for verdict in [
             of(reading(0.08, 0.27), &[], Basis::Measured, found),
             of(reading(0.12, 0.27), &[], Basis::Measured, half),
             of(reading(0.2, 0.34), &[], Basis::Forecast, Looked::NOWHERE),
-            of(reading(0.0, 0.34), &[reading(0.4, 0.16)], Basis::Forecast, Looked::NOWHERE),
         ] {
             assert!(!verdict.to_inspect && verdict.advice.contains("treat it as"), "{verdict:?}");
-            assert!(verdict.within_months.is_some_and(|months| months <= 12), "{verdict:?}");
+            assert_eq!(verdict.within_months, Some(12), "{verdict:?}");
+        }
+        // Of a forecast alone cracks ask for eyes within the time of an inspection.
+        let cracks =
+            of(reading(0.0, 0.34), &[reading(0.4, 0.16)], Basis::Forecast, Looked::NOWHERE);
+        assert!(!cracks.to_inspect && cracks.within_months == Some(24), "{cracks:?}");
+    }
+
+    /// An error bar that reaches the worst state does not call for the worst.
+    #[test]
+    fn at_once_is_earned() {
+        let profile = Profile::default();
+        let looked = Looked { found: true, unseen: 0.0, admitted: None };
+        let mut last = u32::MAX;
+        for step in 0..=20 {
+            let damage = reading(0.05 * f64::from(step), 0.3);
+            for (basis, looked) in [(Basis::Measured, looked), (Basis::Forecast, Looked::NOWHERE)] {
+                let verdict = Verdict::of(&profile, Some(damage), &[], basis, looked);
+                let is_at_once = verdict.within_months == Some(0);
+                assert!(!is_at_once || verdict.probability["severe"] >= CALLED, "{verdict:?}");
+                assert_eq!(
+                    is_at_once,
+                    verdict.advice.contains("severe") || verdict.advice.contains("without delay"),
+                    "{verdict:?}"
+                );
+            }
+            // More damage is never less urgent.
+            let verdict = Verdict::of(&profile, Some(damage), &[], Basis::Measured, looked);
+            let months = verdict.within_months.unwrap();
+            assert!(months <= last, "{step}: {verdict:?}");
+            last = months;
+        }
+        assert_eq!(last, 0);
+    }
+
+    /// Cracks about what the exposure class admits, from the finest to the widest.
+    #[test]
+    fn cracks_within_what_is_admitted_are_watched() {
+        let profile = Profile::default();
+        let limit = 0.3;
+        let mut last = u32::MAX;
+        for width in [0.02_f64, 0.05, 0.1, 0.2, 0.28, 0.3, 0.31, 0.35, 0.5, 1.0, 2.0] {
+            for unseen in [0, 5, 9] {
+                let damage = reading(0.5 * width.min(1.0), 0.1);
+                let own = |zone| (zone >= unseen).then_some(damage);
+                let zones = Zones(std::array::from_fn(own));
+                let evidence =
+                    Evidence::new("survey", true, [(Cause::Concrete, zones)].into(), "".into());
+                let evidence = Evidence { crack_width_mm: Some(width), ..evidence.unwrap() };
+                let listed = width > limit;
+                let looked = Looked::of(&profile, &[&evidence], listed, Some(limit));
+                let whole = reading(damage.value, 0.3);
+                let cracks = profile.cracks(&[&evidence]);
+                let verdict = Verdict::of(&profile, Some(whole), &cracks, Basis::Measured, looked);
+                let is_watched = verdict.advice.starts_with("Monitor");
+                assert_eq!(is_watched, width <= limit, "{width} {unseen} {verdict:?}");
+                if is_watched {
+                    assert_eq!(verdict.state, "between sound and fair");
+                    assert!(verdict.to_inspect && verdict.within_months >= Some(24));
+                }
+                if unseen == 5 {
+                    let months = verdict.within_months.unwrap();
+                    assert!(months <= last, "{width}: {verdict:?}");
+                    last = months;
+                }
+            }
+        }
+    }
+
+    /// Whatever was seen of it, a member that fails by computation is in the worst state, and what
+    /// was assumed is named.
+    #[test]
+    fn a_life_that_ends_is_the_worst() {
+        let profile = Profile::default();
+        let end = |ahead_years| LifeEnd {
+            age_years: 22.0,
+            ahead_years,
+            why: "no equilibrium".into(),
+            assumed: vec!["reinforcement".into()],
+        };
+        let looked = Looked { found: false, unseen: 0.0, admitted: None };
+        for damage in [None, Some(reading(0.0, 0.03)), Some(reading(0.9, 0.1))] {
+            let was = Verdict::of(&profile, damage, &[], Basis::Measured, looked);
+            let now = was.clone().failing(&profile, &end(0.0));
+            assert!(now.state.ends_with("severe") && now.run == Some([3, 3]), "{now:?}");
+            assert!(now.within_months == Some(0) && now.probability["severe"] >= NAMED);
+            assert!((now.probability.values().sum::<f64>() - 1.0).abs() < 1e-12, "{now:?}");
+            assert!(now.advice.contains("year 22") && now.advice.contains("reinforcement"));
+            let later = was.failing(&profile, &end(15.0));
+            assert!(later.state.ends_with("severe") && later.within_months <= Some(12));
         }
     }
 
@@ -462,9 +689,9 @@ mod tests {
             }
             e.unwrap()
         };
-        let of = |e: &Evidence| Looked::of(&profile, &[e], false);
-        assert_eq!(of(&said(0.0, true)), Looked { found: false, unseen: 0.7 });
-        assert_eq!(of(&said(0.3, true)), Looked { found: true, unseen: 0.7 });
+        let of = |e: &Evidence| Looked::of(&profile, &[e], false, None);
+        assert_eq!(of(&said(0.0, true)), Looked { found: false, unseen: 0.7, admitted: None });
+        assert_eq!(of(&said(0.3, true)), Looked { found: true, unseen: 0.7, admitted: None });
         assert_eq!(of(&said(0.3, false)), Looked::NOWHERE);
         let cracked = Evidence { crack_width_mm: Some(0.1), ..said(0.0, true) };
         assert!(of(&cracked).found);
