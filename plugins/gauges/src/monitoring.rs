@@ -1,14 +1,17 @@
 //! Gauges that are read over months and years: what neither temperature nor creep explains is
 //! damage.
 //!
-//! A reading of strain is m(t) = c + α ΔT + (1 + κ) C(t) + Δ ramp(t) + noise. C is what the
-//! forecast says of the sound member: creep, shrinkage, loads as they come. α is expansion less
-//! what the gauge compensates, κ how far creep is off; both have priors and are found with Δ, what
-//! has come between the first and the last fifth of the time, by least squares. Concrete that is
-//! softened by d carries the same force with strain ε/(1 − d): Δ = ε d/(1 − d), ε being the elastic
-//! part of what the forecast says.
+//! A reading of strain is m(t) = c + α ΔT + (1 + κ) C(t) + Δ s(t) + noise. C is what the forecast
+//! says of the sound member: creep, shrinkage, loads as they come. α is expansion less what the
+//! gauge compensates. s(t) rises from 0 at the first reading to 1 at the last: evenly, evenly
+//! between the first and the last fifth of the time, or at once at one of [`STEPS`] moments. c, α
+//! (which has a prior) and Δ are found by least squares for each of these shapes, and shapes are
+//! averaged by how well they fit (Bayesian model averaging, Hoeting et al. 1999). Creep that is off
+//! by κ looks like slow drift, and no reading of one gauge tells them apart: κ is 0 ± [`CREEP`], and
+//! its share of C is in the error of Δ. Concrete that is softened by d carries the same force with
+//! strain ε/(1 − d): Δ = ε d/(1 − d), ε being the elastic part of what the forecast says.
 
-use glam::{DMat4, DVec4};
+use glam::{DMat3, DVec3};
 use intrados_damage::{
     evidence::{Cause, Evidence},
     zone::{ZONES, Zones, zone_at},
@@ -39,6 +42,8 @@ const EXPANSION: [f64; 2] = [5e-6, 5e-6];
 /// Standard deviation of a forecast's creep and shrinkage, as a share (Bažant and Baweja 1995: 23 %
 /// of creep, 34 % of shrinkage by the best models).
 const CREEP: f64 = 0.3;
+/// Moments at which what is not explained may have come at once.
+const STEPS: usize = 19;
 /// Standard deviation of the elastic strain that is foretold, as a share: loads 10 %, stiffness
 /// 10 %.
 const ELASTIC: f64 = 0.15;
@@ -54,13 +59,13 @@ pub struct Drift {
     pub from: String,
     /// Of the last.
     pub to: String,
-    /// From the first fifth of the time to the last: what was read …
+    /// From the first fifth of the time to the last, in the mean: what was read …
     pub read: f64,
     /// … of that by temperature …
     pub by_temperature: f64,
-    /// … by creep, shrinkage and loads …
+    /// … and by creep, shrinkage and loads.
     pub by_creep: f64,
-    /// … and what neither explains.
+    /// What neither explains, from the first reading to the last.
     pub left: Estimate,
     /// What the sound member bears there for long.
     pub elastic: f64,
@@ -172,30 +177,32 @@ fn drift(
         ));
     }
     let rows = rows(samples, course, age, span);
-    let fit = Fit::of(&rows);
+    let fit = DriftFit::of(&rows);
     let mean = |of: &dyn Fn(&Row) -> f64| {
         let by = |late: bool| {
-            let own = rows.iter().filter(|r| if late { r.ramp == 1.0 } else { r.ramp == 0.0 });
+            let own = rows.iter().filter(|r| if late { r.share >= 0.8 } else { r.share <= 0.2 });
             let (sum, n) = own.fold((0.0, 0.0), |(sum, n), r| (sum + of(r), n + 1.0));
             sum / f64::max(n, 1.0)
         };
         by(true) - by(false)
     };
-    let estimate = |k: usize| Estimate { value: fit.at[k], std_error: fit.std_error[k] };
-    let creep = estimate(2);
+    let crept =
+        rows.iter().map(|r| r.creep).fold([0.0_f64; 2], |[low, high], c| [low.min(c), high.max(c)]);
+    let of_creep = CREEP * (crept[1] - crept[0]);
+    let left = Estimate { value: fit.drift.value, std_error: fit.drift.std_error.hypot(of_creep) };
     Ok(Drift {
         gauge: series.gauge.clone(),
         samples: samples.len(),
         from: first.date.to_string(),
         to: last.date.to_string(),
         read: mean(&|r| r.value),
-        by_temperature: fit.at[1] * mean(&|r| r.warmth),
-        by_creep: (1.0 + creep.value) * mean(&|r| r.creep),
-        left: estimate(3),
+        by_temperature: fit.per_kelvin.value * mean(&|r| r.warmth),
+        by_creep: mean(&|r| r.creep),
+        left,
         elastic: course.elastic,
-        per_kelvin: estimate(1),
-        creep_factor: Estimate { value: 1.0 + creep.value, ..creep },
-        damage: damage(estimate(3), course.elastic),
+        per_kelvin: fit.per_kelvin,
+        creep_factor: Estimate { value: 1.0, std_error: CREEP },
+        damage: damage(left, course.elastic),
     })
 }
 
@@ -207,8 +214,8 @@ struct Row {
     warmth: f64,
     /// By the forecast, since the first reading.
     creep: f64,
-    /// 0 in the first fifth of the time, 1 in the last.
-    ramp: f64,
+    /// Share of the time that has passed, 0 to 1.
+    share: f64,
 }
 
 fn rows(
@@ -230,62 +237,128 @@ fn rows(
                 std_error: s.std_error,
                 warmth: s.temperature_c.map_or(0.0, |t| t - mean),
                 creep: course.at(age(s.date)) - begun,
-                ramp: ((share - 0.2) / 0.6).clamp(0.0, 1.0),
+                share,
             }
         })
         .collect()
 }
 
-/// Constant, expansion, creep and drift, with their standard errors.
-struct Fit {
-    at: [f64; 4],
-    std_error: [f64; 4],
+/// How what is not explained has come.
+#[derive(Debug, Clone, Copy)]
+enum DriftShape {
+    /// Evenly over all of the time.
+    Line,
+    /// Evenly between the first and the last fifth.
+    Ramp,
+    /// At once, after a share of the time.
+    Step(f64),
 }
 
-impl Fit {
-    /// Least squares with priors on expansion and creep. Errors grow with what the residuals
-    /// scatter beyond those that were given, and with how alike neighbours are: of n readings of
-    /// correlation ρ only n (1 − ρ)/(1 + ρ) count.
-    fn of(rows: &[Row]) -> Self {
-        let (mut matrix, mut right) = (DMat4::ZERO, DVec4::ZERO);
-        // In units in which all four are of order one.
-        let unit = DVec4::new(1e-4, EXPANSION[1], CREEP, 1e-4);
+impl DriftShape {
+    /// All of them, each with its prior probability: as likely slowly as at once.
+    fn all() -> impl Iterator<Item = (Self, f64)> {
+        let step = |k: usize| (k as f64 + 1.0) / (STEPS as f64 + 1.0);
+        let steps = (0..STEPS).map(move |k| (Self::Step(step(k)), 0.5 / STEPS as f64));
+        [(Self::Line, 0.25), (Self::Ramp, 0.25)].into_iter().chain(steps)
+    }
+
+    /// What has come after a share of the time.
+    fn at(self, share: f64) -> f64 {
+        match self {
+            Self::Line => share,
+            Self::Ramp => ((share - 0.2) / 0.6).clamp(0.0, 1.0),
+            Self::Step(moment) => f64::from(u8::from(share > moment)),
+        }
+    }
+}
+
+/// Units in which constant, expansion and drift are of order one.
+const UNITS: DVec3 = DVec3::new(1e-4, EXPANSION[1], 1e-4);
+
+/// The fit of one shape.
+struct ShapeFit {
+    matrix: DMat3,
+    right: DVec3,
+    /// Residuals over their standard errors.
+    residuals: Vec<f64>,
+    prior: f64,
+}
+
+impl ShapeFit {
+    fn of(rows: &[Row], (shape, prior): (DriftShape, f64)) -> Self {
+        let design = |r: &Row| DVec3::new(1.0, r.warmth, shape.at(r.share)) * UNITS / r.std_error;
+        let (mut matrix, mut right) = (DMat3::ZERO, DVec3::ZERO);
         for row in rows {
-            let design = DVec4::new(1.0, row.warmth, row.creep, row.ramp) * unit / row.std_error;
-            let y = (row.value - row.creep) / row.std_error;
-            for k in 0..4 {
+            let design = design(row);
+            for k in 0..3 {
                 *matrix.col_mut(k) += design * design[k];
             }
-            right += design * y;
+            right += design * (row.value - row.creep) / row.std_error;
         }
-        let data = matrix;
-        let prior = DVec4::new(0.0, EXPANSION[0] / EXPANSION[1], 0.0, 0.0);
-        let solve = |inflate: f64| {
-            let mut matrix = data * (1.0 / inflate);
-            // The constant and the drift are free; the ridge only keeps the matrix regular.
-            matrix.x_axis.x += 1e-12;
-            matrix.y_axis.y += 1.0;
-            matrix.z_axis.z += 1.0;
-            matrix.w_axis.w += 1e-12;
-            let inverse = matrix.inverse();
-            (inverse * (right / inflate + prior), inverse)
-        };
-        let (at, _) = solve(1.0);
-        let residual = |at: DVec4| -> Vec<f64> {
-            let of = |r: &Row| {
-                let design = DVec4::new(1.0, r.warmth, r.creep, r.ramp) * unit;
-                (r.value - r.creep - design.dot(at)) / r.std_error
-            };
-            rows.iter().map(of).collect()
-        };
-        let left = residual(at);
-        let chi2 = left.iter().map(|r| r * r).sum::<f64>();
-        let scatter = (chi2 / (rows.len() as f64 - 4.0).max(1.0)).max(1.0);
-        let alike = left.windows(2).map(|w| w[0] * w[1]).sum::<f64>() / chi2.max(1e-12);
+        let mut fit = Self { matrix, right, residuals: Vec::new(), prior };
+        let (at, _) = fit.solve(1.0);
+        let residual = |r: &Row| (r.value - r.creep) / r.std_error - design(r).dot(at);
+        fit.residuals = rows.iter().map(residual).collect();
+        fit
+    }
+
+    /// Constant, expansion and drift, and their covariance, where noise has so many times the
+    /// variance that was given.
+    fn solve(&self, inflate: f64) -> (DVec3, DMat3) {
+        let mut matrix = self.matrix * (1.0 / inflate);
+        // The constant and the drift are free; the ridge only keeps the matrix regular.
+        matrix.x_axis.x += 1e-12;
+        matrix.y_axis.y += 1.0;
+        matrix.z_axis.z += 1e-12;
+        let inverse = matrix.inverse();
+        let prior = DVec3::new(0.0, EXPANSION[0] / EXPANSION[1], 0.0);
+        (inverse * (self.right / inflate + prior), inverse)
+    }
+
+    fn chi2(&self) -> f64 {
+        self.residuals.iter().map(|r| r * r).sum()
+    }
+
+    /// By how much noise is larger than was given: by the residuals' scatter, and by how alike
+    /// neighbours are: of n readings of correlation ρ only n (1 − ρ)/(1 + ρ) count.
+    fn inflation(&self) -> f64 {
+        let chi2 = self.chi2();
+        let scatter = (chi2 / (self.residuals.len() as f64 - 3.0).max(1.0)).max(1.0);
+        let alike = self.residuals.windows(2).map(|w| w[0] * w[1]).sum::<f64>() / chi2.max(1e-12);
         let alike = alike.clamp(0.0, 0.95);
-        let (at, inverse) = solve(scatter * (1.0 + alike) / (1.0 - alike));
-        let errors = [0, 1, 2, 3].map(|k| inverse.col(k)[k].max(0.0).sqrt() * unit[k]);
-        Self { at: (at * unit).to_array(), std_error: errors }
+        scatter * (1.0 + alike) / (1.0 - alike)
+    }
+}
+
+/// What is not explained, and expansion, by all shapes together.
+struct DriftFit {
+    drift: Estimate,
+    /// 1/K.
+    per_kelvin: Estimate,
+}
+
+impl DriftFit {
+    fn of(rows: &[Row]) -> Self {
+        let fits: Vec<ShapeFit> = DriftShape::all().map(|s| ShapeFit::of(rows, s)).collect();
+        let least = fits.iter().map(ShapeFit::chi2).fold(f64::INFINITY, f64::min);
+        let best = fits.iter().min_by(|a, b| a.chi2().total_cmp(&b.chi2()));
+        let inflate = best.map_or(1.0, ShapeFit::inflation);
+        let (mut whole, mut sums, mut squares) = (0.0, DVec3::ZERO, DVec3::ZERO);
+        for fit in &fits {
+            let weight = fit.prior * (-0.5 * (fit.chi2() - least) / inflate).exp();
+            let (at, covariance) = fit.solve(inflate);
+            let variance = DVec3::from_array([0, 1, 2].map(|k| covariance.col(k)[k].max(0.0)));
+            whole += weight;
+            sums += weight * at;
+            squares += weight * (variance + at * at);
+        }
+        let mean = sums / whole;
+        let variance = squares / whole - mean * mean;
+        let estimate = |k: usize| Estimate {
+            value: mean[k] * UNITS[k],
+            std_error: variance[k].max(0.0).sqrt() * UNITS[k],
+        };
+        Self { drift: estimate(2), per_kelvin: estimate(1) }
     }
 }
 
@@ -359,6 +432,72 @@ mod tests {
         }
         println!("{held} of 200 hold");
         assert!((180..=198).contains(&held), "{held}");
+    }
+
+    /// Weekly readings of a column of an age of ten years, by a gauge that errs by `noise`, with or
+    /// without summers that it does not compensate.
+    fn planted(
+        drift: impl Fn(f64) -> f64,
+        noise: f64,
+        weeks: i32,
+        summers: bool,
+        seed: u64,
+    ) -> Series {
+        let course = course();
+        let key = Key::new(seed, 0);
+        let begin: Date = "2024-01-01".parse().unwrap();
+        let start = 8.0 * 365.25;
+        let samples = (0..weeks).map(|week| {
+            let share = f64::from(week) / f64::from(weeks - 1);
+            let season = (f64::from(week) / 52.0 * std::f64::consts::TAU).sin();
+            let celsius = 10.0 - 9.0 * season + 3.0 * key.normal(4 * week as u32);
+            let warm = if summers { 8e-6 * (celsius - 10.0) } else { 0.0 };
+            let crept = course.at(start + 7.0 * f64::from(week)) - course.at(start);
+            Sample {
+                date: begin.plus_days(7 * i64::from(week)),
+                value: crept + warm + drift(share) + noise * key.normal(4 * week as u32 + 2),
+                std_error: noise,
+                temperature_c: summers.then_some(celsius),
+            }
+        });
+        Series { gauge: "G".into(), samples: samples.collect() }
+    }
+
+    /// What was planted comes back: nothing, drifts of several rates either way, steps early and
+    /// late, by exact and poor gauges; and with an error that is fair.
+    #[test]
+    fn planted_drifts_come_back() {
+        for noise in [1e-7, 1e-6, 5e-6, 2e-5] {
+            for summers in [false, true] {
+                for weeks in [30, 104, 260] {
+                    let close = |name: String, total: f64, drift: &dyn Fn(f64) -> f64| {
+                        let series = planted(drift, noise, weeks, summers, 9);
+                        let now = series.samples.last().unwrap().date;
+                        let age = 8.0 + f64::from(weeks) / 52.18;
+                        let found = super::drift(&series, &course(), age, Some(now)).unwrap().left;
+                        let Estimate { value, std_error } = found;
+                        let place = format!("{name}, {noise}, {weeks}, {summers}: {found:?}");
+                        assert!((value - total).abs() < 3.0 * std_error + 2e-6, "{place}");
+                        let half_year = weeks < 52 && summers;
+                        let fair = 6.0 * noise + 0.12 * total.abs() + 5e-6;
+                        assert!(std_error < if half_year { 1e-4 } else { fair }, "{place}");
+                        assert!(
+                            (value - total).abs() < if half_year { 2e-4 } else { fair },
+                            "{place}"
+                        );
+                    };
+                    close("flat".into(), 0.0, &|_| 0.0);
+                    for total in [-2e-4, -5e-5, 2e-5, 5e-5, 2e-4, 1e-3] {
+                        close(format!("line of {total}"), total, &|share| total * share);
+                        for moment in [0.2, 0.5, 0.83] {
+                            close(format!("step of {total} at {moment}"), total, &|share| {
+                                if share > moment { total } else { 0.0 }
+                            });
+                        }
+                    }
+                }
+            }
+        }
     }
 
     /// A sound column that creeps through three summers drifts by nothing; the raw readings would
