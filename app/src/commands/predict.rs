@@ -195,7 +195,7 @@ fn table(document: &Document) -> String {
             .map(String::from),
     ];
     let number = |x: Option<f64>| x.map_or("-".into(), |x| format!("{x:.3}"));
-    for m in &prediction.members {
+    for m in prediction.failing_first() {
         rows.push([
             m.name.clone(),
             kind_name(m.kind),
@@ -212,6 +212,12 @@ fn table(document: &Document) -> String {
         ]);
     }
     let mut text = output::table(&rows.map_rows());
+    for failure in &prediction.failures {
+        text += &format!("failure {}: {}\n", failure.name, failure.reason);
+    }
+    for line in &prediction.assumptions_to_check {
+        text += &format!("check {line}\n");
+    }
     text += &ledger(prediction);
     for m in &prediction.members {
         m.conflicts.iter().for_each(|c| text += &format!("conflict {}, {c}\n", m.name));

@@ -9,6 +9,7 @@ mod campaign;
 mod csv;
 mod decoders;
 mod gltf;
+mod harm;
 mod ifc_matter;
 mod ifc_shape;
 mod img;

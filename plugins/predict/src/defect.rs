@@ -140,22 +140,31 @@ pub(crate) fn defects(
     found.chain(grouped(slices).iter().flat_map(|group| sectioned(group))).collect()
 }
 
-/// Whether [`defects`] has any, without putting them together.
+/// Whether [`defects`] has any beside cracks no wider than `limit_mm`, without putting them
+/// together.
 #[must_use]
 pub(crate) fn has_defects(
     scene: &Scene,
     member: &str,
     photographed: &Shown,
     slices: &[SliceReading],
+    limit_mm: Option<f64>,
 ) -> bool {
     let member_of = scene.members.iter().find(|m| m.id == member);
     let length = member_of.map_or(1.0, |m| f64::from(m.frame.axis.length()));
     let surveyed = survey::of_member(scene, member).map(|(_, o)| o);
     let all: Vec<&Observation> = surveyed.chain(&photographed.observations).collect();
-    let last = |group: &Vec<usize>| group.last().is_some_and(|&k| is_defect(&all[k].shows));
+    let is_admitted = |width: f64| limit_mm.is_some_and(|limit| width <= limit);
+    let counts = |shows: &Shows| match shows {
+        Shows::Crack { width_mm, .. } => !is_admitted(*width_mm),
+        other => is_defect(other),
+    };
+    let last = |group: &Vec<usize>| group.last().is_some_and(|&k| counts(&all[k].shows));
     let beyond = |lost: Option<Estimate>| lost.is_some_and(|lost| is_beyond(&lost));
     let shows = |s: &SliceReading| {
-        !s.cracks.is_empty() || beyond(s.lost) || beyond(s.steel.map(|steel| steel.loss))
+        s.cracks.iter().any(|c| !is_admitted(c.width_mm))
+            || beyond(s.lost)
+            || beyond(s.steel.map(|steel| steel.loss))
     };
     survey::found_again(&all, length).iter().any(last) || slices.iter().any(shows)
 }

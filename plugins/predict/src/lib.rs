@@ -19,7 +19,9 @@ pub use foreseen::foreseen;
 pub use intrados_ct::source::Origin;
 pub use limits::doubted;
 pub use plugin::{PredictPlugin, Predicted, Predicting, Progress};
-pub use prediction::{CrackCheck, MemberPrediction, MissingEvidence, Prediction, Truth};
+pub use prediction::{
+    CrackCheck, MemberFailure, MemberPrediction, MissingEvidence, Prediction, Truth,
+};
 pub use predictor::{Predictor, predict};
 pub use section::{CT, SliceReading, SliceTruth};
 pub use settings::PredictSettings;

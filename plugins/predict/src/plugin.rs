@@ -4,7 +4,7 @@ use bevy_app::{App, Plugin, Update};
 use bevy_ecs::prelude::*;
 use intrados_ct::source::SliceShelf;
 use intrados_damage::{
-    evidence::{AllEvidence, Evidence, Sources},
+    evidence::{AllEvidence, Evidence, LifeEnd, Sources},
     grading::Profile,
     verdict::{Basis, Looked, Verdict},
     zone::{ZONES, Zones},
@@ -15,7 +15,7 @@ use intrados_scene::{
 };
 use intrados_stage::{Cancelled, Estimate, Job, Jobs, Pace, Stage, Task, aside, file::Set};
 
-use crate::{PredictError, PredictSettings, Prediction, Predictor};
+use crate::{PredictError, PredictSettings, Prediction, Predictor, predictor::admitted_width};
 
 /// Predicts the damage of the members of the [`CurrentScene`]: drains the one queue of work that
 /// [`Predictor`] is, with the [`Sources`] of other plugins, and keeps [`Predicted`] up to date. The
@@ -54,6 +54,8 @@ pub struct Predicted {
     pub basis: [Basis; ZONES],
     /// Whether pieces of evidence contradict each other.
     pub conflict: bool,
+    /// How its computed life ends; `None` if it does not.
+    pub failure: Option<LifeEnd>,
 }
 
 /// How far the prediction has come, for whoever shows it.
@@ -304,27 +306,40 @@ fn judge(
 ) {
     let Some(predictor) = progress.predictor() else { return };
     for (entity, &SceneIndex(index), all) in &members {
-        let found = predictor.has_found(&progress.scene, index);
-        match judged(all, predictor.profile(), found) {
+        let limit = admitted_width(&progress.scene, index, predictor.profile());
+        let found = predictor.has_found(&progress.scene, index, limit);
+        match judged(all, predictor.profile(), found, limit) {
             Some(predicted) => commands.entity(entity).insert(predicted),
             None => commands.entity(entity).remove::<Predicted>(),
         };
     }
 }
 
-/// `found`: whether anything was found to be wrong with the member.
-fn judged(all: &AllEvidence, profile: &Profile, found: bool) -> Option<Predicted> {
+/// `found`: whether anything was found to be wrong with the member but cracks within `limit` (mm),
+/// which is admitted.
+fn judged(
+    all: &AllEvidence,
+    profile: &Profile,
+    found: bool,
+    limit: Option<f64>,
+) -> Option<Predicted> {
     let evidence: Vec<&Evidence> = all.list().iter().collect();
     let whole = profile.fusion.whole(&evidence);
     let damage = whole.damage()?;
+    let failure = evidence.iter().find_map(|e| e.failure.as_ref());
     let evidence: Vec<&Evidence> =
         evidence.into_iter().filter(|e| whole.counted.contains(e.source)).collect();
     let basis = Basis::by_zone(&evidence);
-    let looked = Looked::of(profile, &evidence, found);
+    let looked = Looked::of(profile, &evidence, found, limit);
     let cracks = profile.cracks(&evidence);
     let verdict = Verdict::of(profile, Some(damage), &cracks, Basis::of(&basis), looked);
+    let verdict = match failure {
+        Some(end) => verdict.failing(profile, end),
+        None => verdict,
+    };
     Some(Predicted {
         damage,
+        failure: failure.cloned(),
         zones: whole.zones,
         verdict,
         basis,

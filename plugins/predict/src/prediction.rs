@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use intrados_ct::detect;
 use intrados_damage::{
-    evidence::{Cause, Evidence},
+    evidence::{Cause, Evidence, LifeEnd},
     grading::Profile,
     ledger,
     score::MemberScore,
@@ -33,6 +33,13 @@ pub struct Prediction {
     pub scene: String,
     /// Hash of the scene and of every file it names.
     pub scene_hash: String,
+    /// Members whose computed life ends: the worst findings, those first that have failed by now,
+    /// then by when they fail.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub failures: Vec<MemberFailure>,
+    /// Lives that end by what was only assumed: assumptions to check, no damage. One line each.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub assumptions_to_check: Vec<String>,
     /// The members, in the order of the scene.
     pub members: Vec<MemberPrediction>,
     /// How good the prediction is, over the members whose truth is known.
@@ -49,7 +56,29 @@ pub struct Prediction {
     pub limits: Vec<String>,
 }
 
+/// A member whose computed life ends.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct MemberFailure {
+    /// Its id.
+    pub member: String,
+    /// Its name.
+    pub name: String,
+    /// In one sentence.
+    pub reason: String,
+    /// Years from now; 0 if it has failed by now.
+    pub ahead_years: f64,
+}
+
 impl Prediction {
+    /// The members, those whose computed life ends first, the others in
+    /// the order of the scene.
+    #[must_use]
+    pub fn failing_first(&self) -> Vec<&MemberPrediction> {
+        let mut members: Vec<&MemberPrediction> = self.members.iter().collect();
+        members.sort_by(|a, b| a.failure_order().total_cmp(&b.failure_order()));
+        members
+    }
+
     /// What people call the member of that id; the id itself where it is of none.
     #[must_use]
     pub fn name_of<'a>(&'a self, id: &'a str) -> &'a str {
@@ -105,6 +134,10 @@ pub struct MemberPrediction {
     /// By state, the share of the length that is to be expected in it, of what is known; where it is
     /// graded by strength, the probability that all of it is in that state.
     pub states: BTreeMap<String, f64>,
+    /// How its computed life ends, because it does not carry what acts on it: the worst finding;
+    /// `None` if it does not.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub failure: Option<LifeEnd>,
     /// What it bears and what its damage costs of that; none where nobody asked, or no load acts on
     /// it that could be raised.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -131,6 +164,12 @@ pub struct MemberPrediction {
 }
 
 impl MemberPrediction {
+    /// What sorts members whose computed life ends before all others: years from now.
+    #[must_use]
+    pub fn failure_order(&self) -> f64 {
+        self.failure.as_ref().map_or(f64::INFINITY, |end| end.ahead_years)
+    }
+
     /// What photographs show of it and what they do not, one sentence; none where nobody took one.
     #[must_use]
     pub fn photographed(&self) -> Option<String> {

@@ -168,3 +168,98 @@ fn cores_speak_of_strength() {
     assert!((zone.value - (1.0 - 16.0 / 32.3)).abs() < 0.02, "{zone:?}");
     assert!((0.1..0.35).contains(&zone.std_error), "{zone:?}");
 }
+
+/// From the finest to the widest, by every course, error and number: the whole prediction's damage.
+#[test]
+fn wider_cracks_never_do_less_damage() {
+    for course in ["Across", "Diagonal", "Map"] {
+        for error in ["", ", std_error_mm: 0.05", ", std_error_mm: 1"] {
+            for beside in ["", ", std_error_mm: 0.1"] {
+                let mut last = 0.0;
+                for width in [0.05, 0.2, 0.5, 1.0, 3.0, 10.0, 100.0] {
+                    let crack = |name: &str, width: f64, error: &str| {
+                        let shows = format!("Crack(width_mm: {width}, course: {course}{error})");
+                        item(name, 0.45, &shows)
+                    };
+                    let mut items = vec![crack("knob", width, error)];
+                    if !beside.is_empty() {
+                        items.push(crack("other", 0.1, beside));
+                    }
+                    let damage = predicted("XC4", &items.join(", ")).members[0].damage.unwrap();
+                    assert!(damage >= last, "{course} {error} {width}: {damage} after {last}");
+                    last = damage;
+                }
+                assert!(last >= 0.4, "{course} {error}: {last}");
+            }
+        }
+    }
+}
+
+/// From the thickest to the thinnest, once and many times; and of carbonation.
+#[test]
+fn thinner_covers_and_deeper_fronts_never_say_less_rust() {
+    let active = |items: &[String], class: &str| -> f64 {
+        let prediction = predicted(class, &items.join(", "));
+        let rust = &prediction.members[0].evidence["survey"].details["rust"];
+        let zones = rust["probability_active"].as_array().unwrap();
+        zones.iter().filter_map(serde_json::Value::as_f64).fold(0.0, f64::max)
+    };
+    for count in [1, 28] {
+        let mut last = 0.0;
+        for mm in [70, 55, 45, 35, 25, 15, 10, 6] {
+            let one = |k: usize| item(&format!("c{k}"), 0.45, &format!("Cover(mm: {mm})"));
+            let found = active(&(0..count).map(one).collect::<Vec<_>>(), "XD3");
+            assert!(found >= last, "{count} × {mm} mm: {found} after {last}");
+            last = found;
+        }
+        assert!(last > 0.6, "{count}: {last}");
+    }
+    let mut last = 0.0;
+    for mm in [2, 10, 20, 30, 45, 60, 90] {
+        let front = item("front", 0.45, &format!("Carbonation(mm: {mm})"));
+        let found = active(&[front], "XC4");
+        assert!(found >= last, "{mm} mm: {found} after {last}");
+        last = found;
+    }
+    assert!(last > 0.9, "{last}");
+}
+
+/// Cracks that the exposure class admits are to be watched; wider ones are not.
+#[test]
+fn hairlines_are_watched() {
+    let cracked = |width: f64| {
+        let shows = format!("Crack(width_mm: {width}, course: Across, std_error_mm: 0.05)");
+        let prediction = predicted("XC4", &item("crack", 0.45, &shows));
+        prediction.members[0].clone()
+    };
+    let mut last = u32::MAX;
+    for width in [0.05, 0.1, 0.2, 0.3, 0.35, 0.5, 1.0, 5.0] {
+        let member = cracked(width);
+        let is_watched = member.advice.starts_with("Monitor");
+        assert_eq!(is_watched, width <= 0.3, "{width}: {}", member.advice);
+        assert!(!is_watched || member.state == "between sound and fair", "{}", member.state);
+        let months = member.within_months.unwrap();
+        assert!(months > 0 || member.state_probability["severe"] >= 0.5, "{width}: {months}");
+        assert!(months <= last, "{width}: {months} after {last}");
+        last = months;
+    }
+}
+
+/// The more faces were looked at and found intact, the less is left to do.
+#[test]
+fn a_look_at_more_faces_is_never_more_urgent() {
+    let mut last = 0;
+    for faces in 1..=4 {
+        let names = ["Front", "Right", "Back", "Left"];
+        let one = |name: &&str| {
+            format!("(member: \"C1\", name: \"{name}\", face: {name}, shows: Intact)")
+        };
+        let items: Vec<String> = names[..faces].iter().map(one).collect();
+        let prediction = predicted("XC4", &items.join(", "));
+        let member = &prediction.members[0];
+        let months = member.within_months.unwrap();
+        assert!(months >= 24 && months >= last, "{faces}: {months} {}", member.advice);
+        assert!(!member.advice.contains("treat it as"), "{faces}: {}", member.advice);
+        last = months;
+    }
+}

@@ -204,7 +204,9 @@ impl<'a> Page<'a> {
             self.p.members.iter().filter(|m| self.has_sheet(m) && !m.to_inspect).collect();
         members.sort_by(|a, b| {
             let key = |m: &MemberPrediction| (m.damage.unwrap_or(0.0), likely(m));
-            key(b).0.total_cmp(&key(a).0).then(key(b).1.total_cmp(&key(a).1))
+            let by_damage = key(b).0.total_cmp(&key(a).0);
+            let by_failure = a.failure_order().total_cmp(&b.failure_order());
+            by_failure.then(by_damage).then(key(b).1.total_cmp(&key(a).1))
         });
         let one = |m: &'a MemberPrediction| Finding {
             anchor: self.anchor(m),
@@ -218,7 +220,7 @@ impl<'a> Page<'a> {
                 Some(_) => format!("{:.0} %", 100.0 * likely(m)),
                 None => NOTHING.into(),
             },
-            action: if m.damage.is_some() { &m.advice } else { UNTOLD },
+            action: if m.damage.is_some() || m.failure.is_some() { &m.advice } else { UNTOLD },
             when: self.due(m),
         };
         members.into_iter().map(one).collect()

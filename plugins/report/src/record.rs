@@ -150,13 +150,15 @@ impl Record {
             scene.cameras.first().cloned().unwrap_or_else(|| Camera::overview(scene.bounds()));
         // A segment that nobody expects to be damaged needs no portrait.
         let shows = |m: &MemberPrediction| {
-            m.evidence.values().any(|e| e.measured)
+            m.failure.is_some()
+                || m.evidence.values().any(|e| e.measured)
                 || m.damage.is_some_and(|d| d >= prediction.profile.damaged_from())
         };
         let mut members: Vec<(usize, &MemberPrediction)> =
             prediction.members.iter().enumerate().filter(|(_, m)| shows(m)).collect();
         members.sort_by(|(_, a), (_, b)| {
-            b.damage.partial_cmp(&a.damage).unwrap_or(std::cmp::Ordering::Equal)
+            let by_damage = b.damage.partial_cmp(&a.damage).unwrap_or(std::cmp::Ordering::Equal);
+            a.failure_order().total_cmp(&b.failure_order()).then(by_damage)
         });
         let structure = match scene.structure.project.structure.as_str() {
             "" => &scene.name,

@@ -51,8 +51,9 @@ pub(crate) fn members_csv(prediction: &Prediction) -> String {
         "fails_by",
         "strength_cost [1]",
         "strength_cost_std_error [1]",
+        "failure",
     ]);
-    for m in &prediction.members {
+    for m in prediction.failing_first() {
         let borne = m.capacity.as_ref();
         let width = m.evidence.values().filter_map(|e| e.crack_width_mm).reduce(f64::max);
         let kind = serde_json::to_value(m.kind)
@@ -92,6 +93,7 @@ pub(crate) fn members_csv(prediction: &Prediction) -> String {
             borne.map(|c| c.mode.words().to_owned()).unwrap_or_default(),
             number(borne.map(|c| c.cost.value)),
             number(borne.map(|c| c.cost.std_error)),
+            m.failure.as_ref().map(|end| end.sentence()).unwrap_or_default(),
         ]);
     }
     table.text()

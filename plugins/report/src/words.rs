@@ -25,6 +25,7 @@ pub(crate) fn matters(m: &MemberPrediction) -> bool {
     let is_measured = m.evidence.values().any(|e| e.measured);
     m.damage.is_some_and(|d| d >= LITTLE || is_measured || m.truth.is_some())
         || !m.defects.is_empty()
+        || m.failure.is_some()
 }
 
 /// What is the matter with a member, in few words: the defects that were found, or what is lost by
@@ -33,6 +34,9 @@ pub(crate) fn finding(m: &MemberPrediction) -> String {
     let mut told: Vec<String> = m.defects.iter().take(3).map(defect).collect();
     if m.defects.len() > told.len() {
         told.push(format!("{} more", m.defects.len() - told.len()));
+    }
+    if let Some(end) = &m.failure {
+        told.insert(0, end.sentence());
     }
     if told.is_empty() {
         // The cause that counts most, and who says so.

@@ -229,7 +229,7 @@ fn full(
     let job = session.job.part(0.0, 0.0);
     match forecast::forecast(&scene, span::ID, None, &profile.rule, settings, &job) {
         Err(ForecastError::Cancelled) => Err(Failure::Interrupted),
-        Err(ForecastError::Because(why)) => Ok(Err(why)),
+        Err(why) => Ok(Err(why.to_string())),
         Ok(told) => Ok(told
             .first()
             .map(|told| {

@@ -62,7 +62,12 @@ fn worst(
     actions: &mut Actions,
 ) {
     let damage = |i: &usize| latest.member(*i).map_or(0.0, |p| p.damage.value);
-    known.sort_by(|a, b| damage(b).total_cmp(&damage(a)));
+    // A life that ends by computation comes before any damage.
+    let fails = |i: &usize| {
+        let end = latest.member(*i).and_then(|p| p.failure.as_ref());
+        end.map_or(f64::INFINITY, |end| end.ahead_years)
+    };
+    known.sort_by(|a, b| fails(a).total_cmp(&fails(b)).then(damage(b).total_cmp(&damage(a))));
     if known.is_empty() {
         return;
     }

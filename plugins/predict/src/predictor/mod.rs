@@ -6,6 +6,8 @@
 
 mod together;
 
+pub(crate) use together::admitted_width;
+
 use std::collections::BTreeMap;
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -43,7 +45,7 @@ use crate::{
     compared::score,
     defect::has_defects,
     limits::limits,
-    prediction::{MemberPrediction, MissingEvidence, Prediction, SCHEMA},
+    prediction::{MemberFailure, MemberPrediction, MissingEvidence, Prediction, SCHEMA},
     section,
 };
 
@@ -91,6 +93,10 @@ pub struct Predictor {
     lives: BTreeMap<String, Vec<Forecast>>,
     /// By model, what has been computed of its strength; or why nothing has.
     strengths: BTreeMap<String, Borne>,
+    /// By model, why what was computed of its strength does not even carry what acts.
+    overloaded: BTreeMap<String, String>,
+    /// Lives that end by what was only assumed, one line each.
+    to_check: Vec<String>,
     /// What every member's rest does to it, once a life has asked for it; or why nobody knows.
     frame: Option<Result<Option<frame::Whole>, String>>,
 }
@@ -115,6 +121,9 @@ type Borne = Result<Option<Capacity>, String>;
 struct Bears {
     losses: BTreeMap<String, Losses>,
     found: Borne,
+    /// Whether it does not even carry what acts.
+    #[serde(default)]
+    is_overloaded: bool,
 }
 
 /// One piece of work.
@@ -206,6 +215,8 @@ impl Predictor {
             unused: BTreeMap::new(),
             lives: BTreeMap::new(),
             strengths: BTreeMap::new(),
+            overloaded: BTreeMap::new(),
+            to_check: Vec::new(),
             frame: None,
         }
     }
@@ -397,8 +408,14 @@ impl Predictor {
             let told = match told {
                 Ok(told) => told,
                 Err(ForecastError::Cancelled) => return Err(Cancelled.into()),
-                Err(ForecastError::Because(why)) => {
+                Err(ForecastError::Assumed(why)) => {
+                    let line = format!("{}: {why}", self.name(&models[k]));
+                    self.to_check.push(line);
                     self.fates[first + k] = Some(why);
+                    continue;
+                }
+                Err(why) => {
+                    self.fates[first + k] = Some(why.to_string());
                     continue;
                 }
             };
@@ -437,7 +454,11 @@ impl Predictor {
         let found = match forecast::capacity(scene, model, handed, &losses, job) {
             Ok(found) => Ok(found),
             Err(ForecastError::Cancelled) => return Err(Cancelled.into()),
-            Err(ForecastError::Because(why)) => Err(why),
+            Err(ForecastError::Fails(why)) => {
+                self.overloaded.insert(model.to_owned(), why.clone());
+                Err(why)
+            }
+            Err(why) => Err(why.to_string()),
         };
         self.strengths.insert(model.to_owned(), found);
         Ok(())
@@ -501,7 +522,7 @@ impl Predictor {
                 self.told.extend(evidence.map(|e| (member, e)));
             }
             Err(ForecastError::Cancelled) => return Err(Cancelled.into()),
-            Err(ForecastError::Because(why)) => self.fates[self.next - 1] = Some(why),
+            Err(why) => self.fates[self.next - 1] = Some(why.to_string()),
         }
         Ok(())
     }
@@ -580,7 +601,9 @@ impl Predictor {
             }
             Item::Strength(model) => {
                 let found = self.strengths.get(model)?.clone();
-                let strength = Some(Bears { losses: self.losses_of(scene, model), found });
+                let is_overloaded = self.overloaded.contains_key(model);
+                let losses = self.losses_of(scene, model);
+                let strength = Some(Bears { losses, found, is_overloaded });
                 Some(Done { fate, strength, ..Done::default() })
             }
             Item::Life(_) | Item::Outside(..) | Item::Photograph(..) => None,
@@ -616,6 +639,9 @@ impl Predictor {
             }
             Item::Strength(model) => {
                 let kept = strength.filter(|s| s.losses == self.losses_of(scene, model))?;
+                if let (true, Err(why)) = (kept.is_overloaded, &kept.found) {
+                    self.overloaded.insert(model.clone(), why.clone());
+                }
                 self.strengths.insert(model.clone(), kept.found);
             }
             Item::Life(_) | Item::Outside(..) | Item::Photograph(..) => return None,
@@ -673,16 +699,17 @@ impl Predictor {
         told.chain(seen).collect()
     }
 
-    /// Whether anything has been found to be wrong with a member so far.
+    /// Whether anything has been found to be wrong with a member so far, beside cracks within
+    /// `limit_mm`.
     #[must_use]
-    pub(crate) fn has_found(&self, scene: &Scene, member: usize) -> bool {
+    pub(crate) fn has_found(&self, scene: &Scene, member: usize, limit_mm: Option<f64>) -> bool {
         let (Some(readings), Some(m)) = (self.readings.get(member), scene.members.get(member))
         else {
             return false;
         };
         let nothing = Shown::default();
         let photographed = self.photographed.get(&member).unwrap_or(&nothing);
-        has_defects(scene, &m.id, photographed, readings)
+        has_defects(scene, &m.id, photographed, readings, limit_mm)
     }
 
     /// The prediction from what is done so far.
@@ -708,12 +735,15 @@ impl Predictor {
             version: env!("CARGO_PKG_VERSION"),
             scene: scene.name.clone(),
             scene_hash: scene.hash.clone(),
+            failures: failures(&members),
+            assumptions_to_check: self.to_check.clone(),
             score: score(&members, &self.settings),
             limits: limits(
                 scene,
                 &members,
                 &items,
                 &self.unraised(),
+                &self.to_check,
                 self.settings.profile.by_strength,
             ),
             silences: items.iter().filter_map(silence).collect(),
@@ -723,6 +753,22 @@ impl Predictor {
             settings: self.settings.detect,
         }
     }
+}
+
+/// Members whose computed life ends, the soonest first.
+fn failures(members: &[MemberPrediction]) -> Vec<MemberFailure> {
+    let failure = |m: &MemberPrediction| {
+        let end = m.failure.as_ref()?;
+        Some(MemberFailure {
+            member: m.id.clone(),
+            name: m.name.clone(),
+            reason: end.sentence(),
+            ahead_years: end.ahead_years,
+        })
+    };
+    let mut all: Vec<MemberFailure> = members.iter().filter_map(failure).collect();
+    all.sort_by(|a, b| a.ahead_years.total_cmp(&b.ahead_years));
+    all
 }
 
 /// Predicts the damage of every member: reads all slices, computes lives, asks outside `sources`,

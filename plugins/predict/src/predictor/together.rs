@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use intrados_damage::{
-    evidence::{Cause, Evidence, all_causes},
+    evidence::{Cause, Evidence, LifeEnd, all_causes},
     fusion::Whole,
     grading::Profile,
     ledger, truth,
@@ -206,6 +206,33 @@ impl Predictor {
         members.filter_map(of).collect()
     }
 
+    /// How a member's computed life ends: by its forecast, or since it does not carry what acts with
+    /// what is known of its damage.
+    fn failure(
+        &self,
+        scene: &Scene,
+        id: &str,
+        evidence: &BTreeMap<&'static str, Evidence>,
+    ) -> Option<LifeEnd> {
+        let of_life = evidence.values().find_map(|e| e.failure.clone());
+        of_life.or_else(|| {
+            let assembly = scene.structure.assembly_of(id)?;
+            let why = self.overloaded.get(&assembly.id)?.clone();
+            let age = evidence.get(FORECAST).and_then(|e| e.details.get("age_years")?.as_f64());
+            let of = |is: bool, what: &str| is.then(|| what.to_owned());
+            let assumed = [
+                of(assembly.steel_assumed, "reinforcement"),
+                of(assembly.concrete_assumed, "concrete"),
+            ];
+            Some(LifeEnd {
+                age_years: age.unwrap_or(0.0),
+                ahead_years: 0.0,
+                why,
+                assumed: assumed.into_iter().flatten().collect(),
+            })
+        })
+    }
+
     /// What is known of a member's strength.
     fn capacity(&self, scene: &Scene, id: &str) -> Option<&Capacity> {
         let model = &scene.structure.assembly_of(id)?.id;
@@ -245,9 +272,17 @@ impl Predictor {
         let nothing = Shown::default();
         let photographed = self.photographed.get(&index).unwrap_or(&nothing);
         let defects = defects(scene, &member.id, photographed, &self.readings[index]);
-        let looked = Looked::of(profile, &said, !defects.is_empty());
+        let limit = admitted_width(scene, index, profile);
+        let counts = |width: Option<f64>| width.is_none_or(|w| limit.is_none_or(|most| w > most));
+        let is_listed = defects.iter().any(|d| counts(d.width_mm));
+        let looked = Looked::of(profile, &said, is_listed, limit);
         let cracks = profile.cracks(&said);
         let verdict = Verdict::of(profile, damage, &cracks, Basis::of(&zone_basis), looked);
+        let failure = self.failure(scene, &member.id, &evidence);
+        let verdict = match &failure {
+            Some(end) => verdict.failing(profile, end),
+            None => verdict,
+        };
         let widest = evidence
             .values()
             .filter_map(|e| Some((e.source, e.crack_width_mm?)))
@@ -273,6 +308,7 @@ impl Predictor {
             to_inspect: verdict.to_inspect,
             by_strength: cost.is_some(),
             states: shares(&graded, profile),
+            failure,
             capacity,
             crack_check: widest.and_then(|widest| crack_check(scene, member, widest, profile)),
             conflict: !conflicts.is_empty(),
@@ -415,6 +451,18 @@ fn shares(damages: &[Estimate], profile: &Profile) -> BTreeMap<String, f64> {
     shares
 }
 
+/// The crack width that a member's exposure class admits, mm; `None` where the profile says nothing.
+pub(crate) fn admitted_width(scene: &Scene, index: usize, profile: &Profile) -> Option<f64> {
+    admitted(scene, scene.members.get(index)?, profile)
+}
+
+fn admitted(scene: &Scene, member: &Member, profile: &Profile) -> Option<f64> {
+    let exposure = &member.exposure.as_ref()?.class;
+    let prestressed =
+        scene.structure.assembly_of(&member.id).is_some_and(|a| a.has_tendons(&member.id));
+    profile.crack_limit(exposure, prestressed)
+}
+
 fn crack_check(
     scene: &Scene,
     member: &Member,
@@ -422,9 +470,7 @@ fn crack_check(
     profile: &Profile,
 ) -> Option<CrackCheck> {
     let exposure = member.exposure.as_ref()?.class.clone();
-    let prestressed =
-        scene.structure.assembly_of(&member.id).is_some_and(|a| a.has_tendons(&member.id));
-    let limit_mm = profile.crack_limit(&exposure, prestressed)?;
+    let limit_mm = admitted(scene, member, profile)?;
     Some(CrackCheck { width_mm, source, limit_mm, exposure, exceeded: width_mm > limit_mm })
 }
 
