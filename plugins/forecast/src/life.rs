@@ -1086,7 +1086,8 @@ mod tests {
     #[test]
     fn an_assumption_that_fails_is_no_damage() {
         let beam = "Beam(section: Rectangle(width_m: 0.2, depth_m: 0.2), length_m: 14)";
-        let end = "(member: \"M\", place: End, hold: Directions(x: true, y: true, z: true))]";
+        // Free along the axis, so that it cannot arch between its ends.
+        let end = "(member: \"M\", place: End, hold: Directions(x: false, y: true, z: true))]";
         let light = scene(beam, &format!("{end})"));
         let load = "loads: [(name: \"lamp\", action: Force(place: End, force_kn: (0, -0.1, 0)))]";
         let loaded = scene(beam, &format!("{end}, {load})"));

@@ -190,6 +190,10 @@ pub(crate) fn limits(
     if made(Origin::Drawn) {
         limits.insert(0, format!("Some slices are {MARK}: pictures made from the planted truth. Their scores show that the chain works, not how it would do in the field."));
     }
+    limits.splice(0..0, to_check.iter().map(|line| format!("Check an assumption: {line}.")));
+    let failing = members.iter().filter_map(|m| Some((m, m.failure.as_ref()?)));
+    let failing = failing.map(|(m, end)| format!("{}: {}", m.name, end.sentence()));
+    limits.splice(0..0, failing.collect::<Vec<_>>());
     limits
 }
 

@@ -44,13 +44,12 @@ fn predicted(force_kn: f64, history: &str, evidence: &str) -> Prediction {
 #[test]
 fn overload_is_the_worst_finding_and_comes_first() {
     let mut last = 0.0;
-    for force in [200.0, 1000.0, 3000.0, 30_000.0] {
+    for force in [200.0, 600.0, 3000.0, 30_000.0] {
         for look in ["", "(member: \"B\", name: \"look\", shows: Intact)"] {
             let prediction = predicted(force, "(28, 0), (29, 1)", look);
             let [first, second] = [0, 1].map(|k| prediction.failing_first()[k]);
             let fails = force > 2000.0;
             assert_eq!(prediction.failures.len(), usize::from(fails), "{force} {look}");
-            assert_eq!(prediction.items.iter().filter(|i| !i.used).count(), 0, "{force}");
             if !fails {
                 continue;
             }

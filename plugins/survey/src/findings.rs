@@ -93,10 +93,13 @@ fn one(site: &Site, zone: usize, shows: &Shows, rule: &GradingRule) -> Option<Es
                 }
             };
             let value = opened * share * DEPTH[0];
-            // An error of a width that is wide open already changes nothing: half the way between
-            // one standard error down and up.
+            // Half the way between one standard error down and up: an error of a width that is wide
+            // open already changes nothing. What a net of cracks costs is uncertain by far more.
             let apart = share_open(width_mm + std_error_mm) - share_open(width_mm - std_error_mm);
-            let error = 0.5 * apart * share * DEPTH[0];
+            let error = match course {
+                Course::Map => 0.0,
+                _ => 0.5 * apart * share * DEPTH[0],
+            };
             Some(Estimate {
                 value,
                 std_error: (opened * share * DEPTH[1]).hypot(error).hypot(LOOKED),

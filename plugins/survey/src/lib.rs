@@ -8,6 +8,7 @@ mod findings;
 mod knobs;
 mod measured;
 pub mod photographed;
+mod possible;
 mod rust;
 #[cfg(test)]
 mod simulate;

@@ -22,7 +22,7 @@ use statrs::function::erf::erfc_inv;
 
 use crate::{
     cell::{ReadingCell, bars_of_cell},
-    rust::{MODEL, Possible},
+    possible::{MODEL, Possible},
     site::Site,
 };
 

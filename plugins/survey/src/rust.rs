@@ -13,7 +13,7 @@
 //! | efflorescence, wet spot | 1.5 times as often over bars that rust | ours |
 //!
 //! No class knows of a leaking joint or of salt that somebody spilt: of all that may be, one in
-//! twenty ([`UNFORESEEN`]) rusts since any day of its life, as with salt, whatever its cover (ours).
+//! twenty (`UNFORESEEN`) rusts since any day of its life, as with salt, whatever its cover (ours).
 //! Without that, no reading could speak against a class that lets nothing rust.
 //!
 //! Readings of one kind in one zone err together by their model: of n of them each counts 1/n. Only
@@ -31,11 +31,10 @@ use intrados_damage::{
     grading::Profile,
     zone::{ZONES, Zones},
 };
-use intrados_mechanics::material::durability::{Attack, Bars, Corrosion, Other};
+use intrados_mechanics::material::durability::{Attack, Bars, Corrosion};
 use intrados_scene::structure::{Course, Date, Observation, Shows};
-use intrados_stage::{Cancelled, Estimate, Job, random::Key, time::YEAR};
+use intrados_stage::{Cancelled, Estimate, Job, time::YEAR};
 use serde_json::json;
-use statrs::distribution::{ContinuousCDF, Normal};
 
 use crate::{
     cell::{ReadingCell, bars_of_cell, gather_cells},
@@ -43,65 +42,17 @@ use crate::{
     site::{FORECAST_YEARS, HEARD, Placed, Site},
 };
 
+pub(crate) use crate::possible::{Possible, possible};
+
 /// Things that may be; the posterior of three readings that agree still rests on hundreds.
 pub(crate) const DRAWS: usize = 8192;
 /// So many of them the posterior must rest on (Kish's effective number); else all readings count by
 /// a smaller power.
 const LEAST: f64 = 50.0;
-/// Of a front or profile, relative to itself.
-pub(crate) const MODEL: f64 = 0.15;
 /// Different findings of one kind in one place; of more, neighbours are pooled.
 const MOST_SIGHTS: usize = 64;
 /// Dates that the course of rust is told for.
 const MOST_DATES: usize = 24;
-
-/// Share of all that may be in which something attacks that the class does not know of, and the
-/// share of the draws that are spent on it.
-const UNFORESEEN: f64 = 0.05;
-const DRAWN: f64 = 0.25;
-/// Its rust, µm a year: of chloride, dried and wetted (fib MC2020, table 30.1-6).
-const SALT_RATE: [f64; 2] = [30.0, 40.0];
-/// Seed of when it begins and how fast it goes.
-const SEED: u64 = 0x006c_6561_6b73;
-
-/// One of the things that may be.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Possible {
-    pub(crate) other: Other,
-    /// Logarithm of its weight before anything is read.
-    pub(crate) prior: f64,
-}
-
-/// All that may be of a corrosion, of steel that is `age` (s) old.
-pub(crate) fn possible(corrosion: &Corrosion, count: usize, age: f64) -> Vec<Possible> {
-    let is_drawn = |k: usize| k % 4 == 3;
-    let one = |(k, other): (usize, Other)| {
-        if !is_drawn(k) {
-            return Possible { other, prior: ((1.0 - UNFORESEEN) / (1.0 - DRAWN)).ln() };
-        }
-        let key = Key::new(SEED, k as u64);
-        let since = Some(age * key.unit64(0));
-        let other = Other { current: salt_rate(key.unit64(1)), since, ..other };
-        Possible { other, prior: (UNFORESEEN / DRAWN).ln() }
-    };
-    corrosion.possible(count).into_iter().enumerate().map(one).collect()
-}
-
-/// A corrosion current of [`SALT_RATE`], A/m² (11.6 µm a year are .01 A/m²), at a share of its
-/// distribution.
-fn salt_rate(share: f64) -> f64 {
-    let [mean, deviation] = SALT_RATE;
-    let variance = (1.0 + (deviation / mean).powi(2)).ln();
-    let z = Normal::standard().inverse_cdf(share.clamp(1e-6, 1.0 - 1e-6));
-    0.01 / 11.6 * mean * (variance.sqrt() * z - 0.5 * variance).exp()
-}
-
-#[cfg(test)]
-impl Possible {
-    pub(crate) fn is_unforeseen(&self) -> bool {
-        self.other.since.is_some()
-    }
-}
 
 /// Whether it says anything of rust.
 pub(crate) fn speaks(shows: &Shows) -> bool {
