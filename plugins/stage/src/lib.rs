@@ -9,6 +9,7 @@ pub mod file;
 mod job;
 mod pace;
 pub mod random;
+pub mod sheet;
 mod stages;
 pub mod time;
 
