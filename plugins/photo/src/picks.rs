@@ -4,7 +4,10 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 use intrados_scene::Scene;
-use intrados_stage::access::{self, Denied};
+use intrados_stage::{
+    access::{self, Denied},
+    sheet::{self, DecimalMark, NumberStyle, StyleVerdict},
+};
 
 use crate::{
     Photograph, Pick,
@@ -118,10 +121,18 @@ pub fn read(path: &Path, scene: &Scene, site: &Site) -> Result<Picks, PicksError
 type Fault = (Option<u64>, String);
 
 fn parse(bytes: &[u8], scene: &Scene, site: &Site) -> Result<Picks, Fault> {
-    let mut reader =
-        csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(bytes);
+    let sheet = sheet::decode(bytes).map_err(|why| (None, why.to_string()))?;
+    let (text, separator) = parted(&sheet.text);
+    let mut reader = csv::ReaderBuilder::new()
+        .delimiter(separator)
+        .trim(csv::Trim::All)
+        .comment(Some(b'#'))
+        .from_reader(text.as_bytes());
     let said = |error: csv::Error| {
-        (error.position().map(csv::Position::line), format!("is no table of commas: {error}"))
+        (
+            error.position().map(csv::Position::line),
+            format!("is no table of commas or semicolons: {error}"),
+        )
     };
     let head = reader.headers().map_err(said)?.clone();
     let known = |name: &str| COLUMNS.contains(&name.trim_start_matches('\u{feff}'));
@@ -130,10 +141,12 @@ fn parse(bytes: &[u8], scene: &Scene, site: &Site) -> Result<Picks, Fault> {
         return Err((Some(1), format!("column {name:?} is not known: the columns are {all}")));
     }
     let mut picks = Picks::default();
-    for cells in reader.records() {
-        let cells = cells.map_err(said)?;
+    let records: Vec<csv::StringRecord> =
+        reader.records().collect::<Result<_, _>>().map_err(said)?;
+    let mark = mark(&head, &records, separator)?;
+    for cells in &records {
         let line = cells.position().map(csv::Position::line);
-        let row = Row { head: &head, cells: &cells };
+        let row = Row { head: &head, cells, mark };
         let put = match row.cell("tag") {
             Some(tag) => row.tag(tag, scene, site).and_then(|tag| picks.place(tag)),
             None => row.pick(scene, site).map(|pick| picks.picked.push(pick)),
@@ -141,6 +154,43 @@ fn parse(bytes: &[u8], scene: &Scene, site: &Site) -> Result<Picks, Fault> {
         put.map_err(|what| (line, what))?;
     }
     Ok(picks)
+}
+
+/// The text below a line `sep=;`, which is blanked, and what parts its cells.
+fn parted(text: &str) -> (String, u8) {
+    let full = |line: &&str| !line.trim().is_empty() && !line.starts_with('#');
+    let first = text.lines().find(full).unwrap_or_default();
+    match sheet::named_separator(first) {
+        Some(separator) => (text.replacen(first, "", 1), separator),
+        None => (text.to_owned(), sheet::separator(first)),
+    }
+}
+
+/// The decimal mark of a table: all its numbers have the same one.
+fn mark(
+    head: &csv::StringRecord,
+    records: &[csv::StringRecord],
+    separator: u8,
+) -> Result<DecimalMark, Fault> {
+    let mut style = NumberStyle::default();
+    let words = ["photo", "member", "face", "corner", "tag"];
+    for cells in records {
+        let named = head.iter().zip(cells).filter(|(name, _)| !words.contains(name));
+        named.for_each(|(_, cell)| style.learn(cell));
+    }
+    match style.verdict(NumberStyle::default()) {
+        StyleVerdict::Certain(mark) => Ok(mark),
+        StyleVerdict::Open if !style.is_open() => Ok(DecimalMark::Point),
+        // A point is a decimal point where no cell speaks against it.
+        StyleVerdict::Open if !records.iter().flatten().any(|cell| cell.contains(',')) => {
+            Ok(DecimalMark::Point)
+        }
+        // Where commas part no cells they are of decimals: no site is thousands of metres wide.
+        StyleVerdict::Open if separator != b',' => Ok(DecimalMark::Comma),
+        StyleVerdict::Open | StyleVerdict::Mixed => {
+            Err((None, "has commas and points in its numbers: write decimals in one way".into()))
+        }
+    }
 }
 
 impl Picks {
@@ -159,6 +209,7 @@ impl Picks {
 struct Row<'a> {
     head: &'a csv::StringRecord,
     cells: &'a csv::StringRecord,
+    mark: DecimalMark,
 }
 
 impl Row<'_> {
@@ -169,7 +220,7 @@ impl Row<'_> {
 
     fn number(&self, name: &str) -> Result<f64, String> {
         let text = self.cell(name).ok_or_else(|| format!("{name} is missing"))?;
-        let value = text.parse::<f64>().ok().filter(|x| x.is_finite());
+        let value = sheet::number(text, self.mark).map(|number| number.value);
         value.ok_or_else(|| format!("{name} {text:?} is no number"))
     }
 
