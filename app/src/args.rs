@@ -432,6 +432,9 @@ pub(crate) struct PlaceArgs {
     /// A photograph of a finding (.jpg, .png) for the report
     #[arg(long, value_name = "FILE", requires = "finding", conflicts_with = "files")]
     pub(crate) picture: Option<PathBuf>,
+    /// It is meant as it is written: what is doubted counts
+    #[arg(long)]
+    pub(crate) confirmed: bool,
 }
 
 // What a file does not say itself.

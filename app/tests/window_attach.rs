@@ -73,6 +73,7 @@ fn attachment(what: What) -> Attachment {
         height_m: None,
         instrument: None,
         picture: None,
+        confirmed: false,
         what,
     }
 }

@@ -77,6 +77,7 @@ fn attachment(args: &args::Attach) -> Result<Attachment, Failure> {
         height_m: place.height,
         instrument: place.instrument.clone(),
         picture: picture(place.picture.as_deref())?,
+        confirmed: place.confirmed,
         what: what(args)?,
     })
 }
@@ -157,6 +158,7 @@ fn photograph(args: &args::Attach, picks: &Path) -> Result<What, Failure> {
         (place.height.is_some(), "--height: its picks tell"),
         (place.instrument.is_some(), "--instrument is of a finding or of a table"),
         (args.stack.stack || args.stack.raw.is_some(), "--stack and --raw are of CT slices"),
+        (place.confirmed, "--confirmed is of a finding or of a table"),
         (of.pixel_mm.is_some(), "--pixel-mm is of CT slices"),
         (
             of.unit.is_some() || of.kind.is_some() || of.test.is_some(),
@@ -184,6 +186,7 @@ fn load_test(args: &args::Attach, force_kn: f64) -> Result<What, Failure> {
         (place.face.is_some() || place.angle.is_some(), "--face and --angle: a weight is on top"),
         (place.height.is_some(), "--height is of a finding; a load test has --along"),
         (place.date.is_some(), "--date is of a finding or of a table"),
+        (place.confirmed, "--confirmed is of a finding or of a table"),
         (place.instrument.is_some(), "--instrument is of a finding or of a table"),
         (f.std_error.is_some(), "--std-error is of a finding"),
         (f.depth_mm.is_some(), "--depth-mm is of a --spall or of CT slices"),

@@ -4,7 +4,10 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 use intrados_scene::Scene;
-use intrados_stage::access::{self, Denied};
+use intrados_stage::{
+    access::{self, Denied},
+    sheet::{self, DecimalMark, NumberStyle, StyleVerdict},
+};
 
 use crate::{
     Photograph, Pick,
@@ -134,15 +137,18 @@ pub fn read(path: &Path, scene: &Scene, site: &Site) -> Result<Picks, PicksError
 type Fault = (Option<u64>, String);
 
 fn parse(bytes: &[u8], scene: &Scene, site: &Site) -> Result<Picks, Fault> {
-    let text = text_of(bytes);
-    let comma = delimiter(&text);
+    let sheet = sheet::decode(bytes).map_err(|why| (None, why.to_string()))?;
+    let (text, separator) = parted(&sheet.text);
     let mut reader = csv::ReaderBuilder::new()
+        .delimiter(separator)
         .trim(csv::Trim::All)
         .comment(Some(b'#'))
-        .delimiter(comma)
         .from_reader(text.as_bytes());
     let said = |error: csv::Error| {
-        (error.position().map(csv::Position::line), format!("is no table of commas: {error}"))
+        (
+            error.position().map(csv::Position::line),
+            format!("is no table of commas or semicolons: {error}"),
+        )
     };
     let head = reader.headers().map_err(said)?.iter().map(str::to_lowercase).collect();
     let head: csv::StringRecord = head;
@@ -154,10 +160,12 @@ fn parse(bytes: &[u8], scene: &Scene, site: &Site) -> Result<Picks, Fault> {
         return Err((Some(1), format!("column {twice:?} is there twice: leave out one")));
     }
     let mut picks = Picks::default();
-    for cells in reader.records() {
-        let cells = cells.map_err(said)?;
+    let records: Vec<csv::StringRecord> =
+        reader.records().collect::<Result<_, _>>().map_err(said)?;
+    let mark = mark(&head, &records, separator)?;
+    for cells in &records {
         let line = cells.position().map(csv::Position::line);
-        let row = Row { head: &head, cells: &cells, is_comma_decimal: comma != b',' };
+        let row = Row { head: &head, cells, mark };
         let put = match row.cell("tag") {
             Some(tag) => row.tag(tag, scene, site).and_then(|tag| picks.place(tag)),
             None => row.pick(scene, site).map(|pick| picks.picked.push(pick)),
@@ -168,25 +176,6 @@ fn parse(bytes: &[u8], scene: &Scene, site: &Site) -> Result<Picks, Fault> {
         Some(what) => Err((None, what)),
         None => Ok(picks),
     }
-}
-
-/// The text of a table without the mark of its order of bytes; what is no UTF-8 is Latin-1, as
-/// spreadsheets write it.
-fn text_of(bytes: &[u8]) -> String {
-    let text = match std::str::from_utf8(bytes) {
-        Ok(text) => text.to_owned(),
-        Err(_) => bytes.iter().map(|byte| char::from(*byte)).collect(),
-    };
-    text.trim_start_matches('\u{feff}').to_owned()
-}
-
-/// What divides the cells: what the head's line has most of.
-fn delimiter(text: &str) -> u8 {
-    let is_head = |line: &&str| !line.trim().is_empty() && !line.starts_with('#');
-    let head = text.lines().find(is_head).unwrap_or_default();
-    let count = |mark: u8| head.bytes().filter(|b| *b == mark).count();
-    // Of equal counts the last: a comma.
-    [b'\t', b';', b','].into_iter().max_by_key(|mark| count(*mark)).unwrap_or(b',')
 }
 
 /// Why the places are not those of this scene: most lie farther from it than it is large. A camera
@@ -208,6 +197,43 @@ fn far(picks: &Picks, scene: &Scene) -> Option<String> {
     ))
 }
 
+/// The text below a line `sep=;`, which is blanked, and what parts its cells.
+fn parted(text: &str) -> (String, u8) {
+    let full = |line: &&str| !line.trim().is_empty() && !line.starts_with('#');
+    let first = text.lines().find(full).unwrap_or_default();
+    match sheet::named_separator(first) {
+        Some(separator) => (text.replacen(first, "", 1), separator),
+        None => (text.to_owned(), sheet::separator(first)),
+    }
+}
+
+/// The decimal mark of a table: all its numbers have the same one.
+fn mark(
+    head: &csv::StringRecord,
+    records: &[csv::StringRecord],
+    separator: u8,
+) -> Result<DecimalMark, Fault> {
+    let mut style = NumberStyle::default();
+    let words = ["photo", "member", "face", "corner", "tag"];
+    for cells in records {
+        let named = head.iter().zip(cells).filter(|(name, _)| !words.contains(name));
+        named.for_each(|(_, cell)| style.learn(cell));
+    }
+    match style.verdict(NumberStyle::default()) {
+        StyleVerdict::Certain(mark) => Ok(mark),
+        StyleVerdict::Open if !style.is_open() => Ok(DecimalMark::Point),
+        // A point is a decimal point where no cell speaks against it.
+        StyleVerdict::Open if !records.iter().flatten().any(|cell| cell.contains(',')) => {
+            Ok(DecimalMark::Point)
+        }
+        // Where commas part no cells they are of decimals: no site is thousands of metres wide.
+        StyleVerdict::Open if separator != b',' => Ok(DecimalMark::Comma),
+        StyleVerdict::Open | StyleVerdict::Mixed => {
+            Err((None, "has commas and points in its numbers: write decimals in one way".into()))
+        }
+    }
+}
+
 impl Picks {
     fn place(&mut self, tag: TagAt) -> Result<(), String> {
         let of_one = |a: &Option<String>, b: &Option<String>| a == b || a.is_none() || b.is_none();
@@ -224,8 +250,7 @@ impl Picks {
 struct Row<'a> {
     head: &'a csv::StringRecord,
     cells: &'a csv::StringRecord,
-    /// Whether a comma may stand before decimals.
-    is_comma_decimal: bool,
+    mark: DecimalMark,
 }
 
 impl Row<'_> {
@@ -236,11 +261,7 @@ impl Row<'_> {
 
     fn number(&self, name: &str) -> Result<f64, String> {
         let text = self.cell(name).ok_or_else(|| format!("{name} is missing"))?;
-        let dotted = match self.is_comma_decimal && !text.contains('.') {
-            true => text.replacen(',', ".", 1),
-            false => text.to_owned(),
-        };
-        let value = dotted.parse::<f64>().ok().filter(|x| x.is_finite());
+        let value = sheet::number(text, self.mark).map(|number| number.value);
         value.ok_or_else(|| format!("{name} {text:?} is no number"))
     }
 

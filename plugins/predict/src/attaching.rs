@@ -1,7 +1,10 @@
 //! What is looked at before evidence is attached, by whoever attaches it: whether a prediction could
 //! use it, and what speaks against it.
 
-use std::path::{Path, PathBuf};
+use std::{
+    collections::HashSet,
+    path::{Path, PathBuf},
+};
 
 use intrados_ct::{Picture, Slice, Slices, source::SliceSource};
 use intrados_scene::{
@@ -40,7 +43,28 @@ pub fn examine(
     let mut notes = doubts(proposal, what, given)?;
     notes.extend(placed(proposal, what, job)?);
     notes.extend(proposal.notes.iter().cloned());
+    notes.extend(unused_readings(proposal));
     Ok(notes)
+}
+
+/// Which of the readings that are attached no prediction uses, and why: one line for each reason.
+fn unused_readings(proposal: &Proposal<'_>) -> Vec<String> {
+    let scene = &proposal.scene;
+    let added: HashSet<&str> = proposal
+        .added
+        .iter()
+        .filter(|one| one.kind == "gauge")
+        .map(|one| one.name.as_str())
+        .collect();
+    let mut lines: Vec<String> = Vec::new();
+    let mut reasons: HashSet<String> = HashSet::new();
+    for reading in scene.structure.readings.iter().filter(|r| added.contains(r.of.as_str())) {
+        let Some(why) = intrados_gauges::refusal(scene, reading) else { continue };
+        if reasons.insert(why.clone()) {
+            lines.push(format!("gauge {}: not used, because {why}", reading.of));
+        }
+    }
+    lines
 }
 
 /// Refuses what a report cannot show as a photograph of a finding.

@@ -10,6 +10,7 @@ pub mod file;
 mod job;
 mod pace;
 pub mod random;
+pub mod sheet;
 mod stages;
 pub mod time;
 

@@ -33,11 +33,11 @@ const NOTE: Duration = Duration::from_secs(10);
 const BEGUN: &str = "begun.json";
 
 /// Reads a table of bridges; its hash.
-pub(super) fn read(path: &Path) -> Result<(Vec<span::Bridge>, String), Failure> {
+pub(super) fn read(path: &Path) -> Result<(span::BridgeTable, String), Failure> {
     let bytes = access::read(path, LONGEST).map_err(|why| Failure::denied(path, &why))?;
-    let bridges = span::parse(&bytes)
+    let table = span::parse(&bytes)
         .map_err(|why| Failure::BadInput(format!("{}: {why}", path.display())))?;
-    Ok((bridges, blake3::hash(&bytes).to_hex().to_string()))
+    Ok((table, blake3::hash(&bytes).to_hex().to_string()))
 }
 
 /// What is done of a unit: how many bridges, and their rows.
@@ -55,7 +55,8 @@ pub(super) fn rows(
     [i, n]: [u64; 2],
     folder: &Path,
 ) -> Result<Rows, Failure> {
-    let (bridges, hash) = read(&structure.path)?;
+    let (table, hash) = read(&structure.path)?;
+    let bridges = table.bridges;
     if hash != structure.hash {
         return Err(Failure::BadInput(format!(
             "{}: has changed since the campaign was planned: plan a new one",

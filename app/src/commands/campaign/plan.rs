@@ -189,7 +189,7 @@ pub(crate) fn plan(session: &Session, args: &args::CampaignNew) -> Result<Plan, 
         units: Vec::new(),
     };
     match args.over.iter().find(|path| is_table(path)) {
-        Some(table) if args.over.len() == 1 => of_table(&mut plan, args, table)?,
+        Some(table) if args.over.len() == 1 => of_table(session, &mut plan, args, table)?,
         Some(table) => {
             return Err(Failure::Usage(format!(
                 "{}: a table of bridges goes alone: plan a campaign for each",
@@ -214,15 +214,23 @@ fn unit(structure: usize, member: Option<String>, part: [u64; 2]) -> Unit {
     Unit { id: String::new(), structure, member, part }
 }
 
-fn of_table(plan: &mut Plan, args: &args::CampaignNew, path: &Path) -> Result<(), Failure> {
+fn of_table(
+    session: &Session,
+    plan: &mut Plan,
+    args: &args::CampaignNew,
+    path: &Path,
+) -> Result<(), Failure> {
     if args.command != args::Job::Predict || !args.rest.is_empty() || args.each_member {
         return Err(Failure::Usage(
             "a table of bridges can only be predicted, and its options stand before --".into(),
         ));
     }
     let path = std::path::absolute(path).map_err(|e| Failure::no_input(path, &e))?;
-    let (bridges, hash) = super::network::read(&path)?;
-    let rows = bridges.len().min(args.first.unwrap_or(usize::MAX));
+    let (table, hash) = super::network::read(&path)?;
+    for doubt in &table.doubts {
+        session.note(&format!("{}: {doubt}", path.display()));
+    }
+    let rows = table.bridges.len().min(args.first.unwrap_or(usize::MAX));
     if rows == 0 {
         return Err(Failure::BadInput(format!("{}: no bridges in it", path.display())));
     }

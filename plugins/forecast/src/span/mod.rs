@@ -15,7 +15,7 @@ mod table;
 pub use drawn::{ID, drawn};
 pub use rules::{Kind, Span, spans};
 pub use section::{Life, Sections, Settings, of_foretold};
-pub use table::{Bridge, TableError, parse};
+pub use table::{Bridge, BridgeTable, TableError, parse};
 
 /// What a table of lengths and years does not say, for every page that shows a network.
 pub const CANNOT_SAY: [&str; 6] = [

@@ -27,6 +27,7 @@ impl Form {
             height_m: number(&tr!("height"), &self.height_m)?.filter(|_| is_finding),
             instrument: text(&self.instrument).filter(|_| !is_slices),
             picture: text(&self.picture).filter(|_| is_finding).map(PathBuf::from),
+            confirmed: false,
             what,
         })
     }

@@ -257,6 +257,7 @@ pub(super) fn attachment(photo: &Photographed) -> Attachment {
         height_m: None,
         instrument: None,
         picture: None,
+        confirmed: false,
         what: What::Photograph {
             files: [photo.file.clone(), photo.picks.clone()],
             focal_px: photo.focal_px,

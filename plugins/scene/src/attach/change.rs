@@ -193,6 +193,7 @@ mod tests {
             height_m: None,
             instrument: None,
             picture: Some(picture),
+            confirmed: false,
             what,
         }
     }

@@ -107,6 +107,8 @@ pub struct Attachment {
     pub instrument: Option<String>,
     /// A photograph of a finding, JPEG or PNG.
     pub picture: Option<PathBuf>,
+    /// A finding or a table is meant as it is written, and counts however much it is doubted.
+    pub confirmed: bool,
     /// What it is.
     pub what: What,
 }
@@ -527,6 +529,7 @@ impl Project {
                     Some(file) => Some(format!("{at}/{}", plain_name(file)?)),
                     None => None,
                 },
+                confirmed: what.confirmed,
                 shows: finding.clone(),
             }),
             What::Table { file, kind, unit, test, electrode } => Entry::Table(Survey {
@@ -543,6 +546,7 @@ impl Project {
                 kind: *kind,
                 unit: unit.clone(),
                 test: test.clone(),
+                confirmed: what.confirmed,
             }),
             What::Slices { files, pixel_mm, cut } => {
                 let copies: Vec<PathBuf> = files.iter().map(|f| copied_as(f, None)).collect();

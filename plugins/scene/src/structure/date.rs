@@ -51,7 +51,8 @@ impl Date {
     }
 
     /// Its year.
-    pub(crate) fn year(self) -> i32 {
+    #[must_use]
+    pub fn year(self) -> i32 {
         self.year
     }
 
@@ -60,6 +61,11 @@ impl Date {
     pub fn today() -> Self {
         let since = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
         Self::of_number(since.map_or(0, |d| (d.as_secs() / 86_400) as i64))
+    }
+
+    /// Whether nobody can have measured then yet: it is after today everywhere on earth.
+    pub(crate) fn is_to_come(self) -> bool {
+        self > Self::today().plus_days(1)
     }
 
     /// Days since the first of January 1970. The year is taken to begin in March, so that the day

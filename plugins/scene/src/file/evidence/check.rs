@@ -11,9 +11,6 @@ use crate::{
     structure::{Date, Electrode},
 };
 
-/// How far ahead of today a date may lie before its year is doubted, days.
-const AHEAD: i64 = 366;
-
 /// Lists all that is wrong with a file of evidence as far as it can be told without its scene:
 /// numbers out of range, names that are empty. Whether its members, faces and gauges are there is
 /// told when the scene is loaded.
@@ -63,6 +60,14 @@ pub(super) fn check_seat(seat: &Seat) -> Vec<Problem> {
     c.problems
 }
 
+/// Why what was measured on a day to come does not count.
+pub(super) fn to_come(date: Date) -> String {
+    format!(
+        "{date} is a day to come (today is {}): is the year right? correct it, or confirm it (confirmed: true, attach --confirmed)",
+        Date::today()
+    )
+}
+
 impl Checker<'_> {
     fn record(&mut self, r: &Record) {
         self.text("member", &r.member);
@@ -70,7 +75,7 @@ impl Checker<'_> {
         if let Some(instrument) = &r.instrument {
             self.text("instrument", instrument);
         }
-        self.date(r.date);
+        self.date(r.date.filter(|_| !r.confirmed));
         self.spot(r.along, r.face.is_some(), r.angle_deg, r.height_m);
         self.at("shows", |c| c.finding(&r.shows));
     }
@@ -95,9 +100,8 @@ impl Checker<'_> {
     }
 
     fn date(&mut self, date: Option<Date>) {
-        if let Some(date) = date.filter(|d| *d > Date::today().plus_days(AHEAD)) {
-            let message = format!("{date} is more than a year ahead: is the year right?");
-            self.error("date", "FUTURE", message);
+        if let Some(date) = date.filter(|d| d.is_to_come()) {
+            self.error("date", "FUTURE", to_come(date));
         }
     }
 
@@ -286,7 +290,7 @@ impl Checker<'_> {
         self.text("file", &s.file);
         self.text("member", &s.member);
         self.text("name", &s.name);
-        self.date(s.date);
+        self.date(s.date.filter(|_| !s.confirmed));
         self.spot(s.along, s.face.is_some(), s.angle_deg, s.height_m);
         if let Some(instrument) = &s.instrument {
             self.text("instrument", instrument);

@@ -7,9 +7,12 @@
 
 mod along;
 mod check;
+mod day;
 mod face;
+mod layout;
 mod place;
 mod table;
+mod units;
 
 use std::{
     collections::HashMap,
@@ -105,6 +108,9 @@ pub struct Record {
     /// A photograph of it for the report, JPEG or PNG, relative to this file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub picture: Option<String>,
+    /// It is meant as it is written, and counts however much it is doubted.
+    #[serde(default, skip_serializing_if = "is_usual")]
+    pub confirmed: bool,
     /// What was found.
     pub shows: Finding,
 }
@@ -306,6 +312,9 @@ pub struct Survey {
     /// Of gauges: the load test, of rows that do not name one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub test: Option<String>,
+    /// All rows are meant as they are written, and count however much they are doubted.
+    #[serde(default, skip_serializing_if = "is_usual")]
+    pub confirmed: bool,
 }
 
 /// What a column `value` holds.
@@ -530,7 +539,7 @@ impl Evidence {
                 open(&evidence.folder, &survey.file).map_err(|e| e.under(&place))?;
             match read_table(&name, &bytes, survey) {
                 Ok(rows) => {
-                    evidence.notes.extend(rows.note);
+                    evidence.notes.extend(rows.notes);
                     evidence.records.extend(rows.records);
                     evidence.readings.extend(rows.readings);
                     if evidence.records.len() + evidence.readings.len() > MAX_ROWS {

@@ -8,15 +8,15 @@ use std::{
 use super::{
     Along, Evidence, Face, Finding, Photo, Placed, RawReading, Record,
     face::UPRIGHT,
-    table::{MOST_STRAIN, Seat},
+    table::{MOST_STRAIN, Seat, doubt_covers, doubt_profile},
 };
 use crate::{
     Member, Scene,
     file::{nearest, shorten},
     problem::Problem,
     structure::{
-        Date, Gauge, Measures, Observation, Photographed, Reading, Sample, Series, Shows, Spot,
-        Structure, usual,
+        Action, Course, Date, Gauge, Measures, Observation, Photographed, Reading, Sample, Series,
+        Shows, Spot, Structure, Test, usual,
     },
 };
 
@@ -84,8 +84,12 @@ struct Placing<'a> {
     photographs: Vec<Photographed>,
     /// Gauges that tables define.
     gauges: Vec<Gauge>,
+    /// Gauges of the scene, of this file and of its tables, by name.
+    gauge_of: HashMap<String, Gauge>,
     readings: Vec<Reading>,
     series: Vec<Series>,
+    /// Where the series of a gauge is among them.
+    series_of: HashMap<String, usize>,
     /// What gauges have shown by now, and where that is said first.
     read: HashMap<Shown, String>,
     warnings: Vec<String>,
@@ -112,8 +116,18 @@ impl<'a> Placing<'a> {
             observations: Vec::new(),
             photographs: Vec::new(),
             gauges: Vec::new(),
+            // Of two of one name the first holds.
+            gauge_of: own
+                .file
+                .gauges
+                .iter()
+                .rev()
+                .chain(scene.structure.gauges.iter().rev())
+                .map(|gauge| (gauge.name.clone(), gauge.clone()))
+                .collect(),
             readings: Vec::new(),
             series: Vec::new(),
+            series_of: HashMap::new(),
             read: HashMap::new(),
             warnings: Vec::new(),
         }
@@ -141,7 +155,9 @@ impl<'a> Placing<'a> {
         let at =
             |list: &str, i: usize, field: &str| format!("{}: {list}[{i}].{field}", evidence.name);
         for (i, test) in file.tests.iter().enumerate() {
-            self.member(&at("tests", i, "member"), &test.member);
+            if let Some(index) = self.member(&at("tests", i, "member"), &test.member) {
+                self.warnings.extend(doubt_weights(&self.scene.members[index], test));
+            }
             if structure.tests.iter().any(|t| t.name == test.name) {
                 self.taken(at("tests", i, "name"), &test.name, "a load test of the scene");
             }
@@ -225,7 +241,7 @@ impl<'a> Placing<'a> {
     }
 
     fn known(&self, name: &str) -> Option<&Gauge> {
-        self.gauges().find(|g| g.name == name)
+        self.gauge_of.get(name)
     }
 
     /// Defines the gauge of a row that says where it is; compares the places where it is known.
@@ -274,21 +290,26 @@ impl<'a> Placing<'a> {
             );
             return self.error(reading.field("gauge"), "NO_SIDE", message);
         };
-        self.gauges.push(Gauge {
+        let gauge = Gauge {
             name: what.of.clone(),
             member: what.member.clone(),
             along: seat.along,
             angle_deg,
             depth_mm: seat.depth_mm.unwrap_or_default(),
             measures,
-        });
+        };
+        self.gauge_of.insert(gauge.name.clone(), gauge.clone());
+        self.gauges.push(gauge);
     }
 
     /// The gauge of that name; a problem with the remedy for a new one where neither a gauge nor a
     /// meter has it.
     fn gauge(&mut self, place: &str, name: &str, remedy: &str) -> Option<Gauge> {
         let gauge = self.known(name).cloned();
-        if gauge.is_none() && !self.scene.meters.iter().any(|m| m.name == name) {
+        if gauge.is_none()
+            && self.problems.len() < MAX_PROBLEMS
+            && !self.scene.meters.iter().any(|m| m.name == name)
+        {
             let known: Vec<&str> = self.gauges().map(|g| g.name.as_str()).collect();
             let hint = match nearest(name, &known) {
                 Some(known) => format!("did you mean {known}? If not, {remedy}"),
@@ -383,7 +404,9 @@ impl<'a> Placing<'a> {
                 std_error: what.std_error,
                 temperature_c: what.temperature_c,
             };
-            match self.series.iter_mut().find(|s| s.gauge == what.of) {
+            let next = self.series.len();
+            let at = *self.series_of.entry(what.of.clone()).or_insert(next);
+            match self.series.get_mut(at) {
                 Some(series) => series.samples.push(sample),
                 None => self.series.push(Series { gauge: what.of.clone(), samples: vec![sample] }),
             }
@@ -422,6 +445,13 @@ impl<'a> Placing<'a> {
                 called(&self.scene.members[index])
             );
             return self.error(record.field(name), "UNIT", message);
+        }
+        if let Some(why) = too_long(&self.scene.members[index], &what.shows) {
+            return self.error(record.field("shows.length_m"), "UNIT", why);
+        }
+        if let Some(doubt) = doubt_finding(what).filter(|_| !record.is_row && !what.confirmed) {
+            let name = called(&self.scene.members[index]);
+            self.warnings.push(format!("{} of {name}: {doubt}", what.name));
         }
         if let Finding::Spall { depth_mm: Some(mm), .. } = what.shows {
             let member = &self.scene.members[index];
@@ -579,6 +609,67 @@ fn elsewhere(known: &Gauge, seat: Seat, angle_deg: Option<f32>) -> Option<String
             at(seat.along, angle, depth)
         )
     })
+}
+
+/// What of a single finding is odd, and used.
+fn doubt_finding(record: &Record) -> Option<String> {
+    match &record.shows {
+        Finding::Cover { mm, .. } => doubt_covers(&[*mm]),
+        Finding::HalfCell { mv, .. } if *mv > 50.0 => Some(format!(
+            "{mv} mV is above 0, as steel in dry concrete at most shows: was the sign lost? write -{mv}, or confirm it (confirmed: true, attach --confirmed)"
+        )),
+        Finding::Chloride { depths_mm, percent_of_cement, percent_of_concrete, .. } => {
+            doubt_profile(depths_mm, percent_of_cement, percent_of_concrete)
+        }
+        _ => None,
+    }
+}
+
+/// Why a crack is not so long: along its member it is no longer than that, and no crack that runs
+/// in another way, or a net of them, is longer than twice the member and twice its girth.
+fn too_long(member: &Member, finding: &Finding) -> Option<String> {
+    let Finding::Crack { length_m: Some(length), course, .. } = *finding else { return None };
+    let size = (member.bounds[1] - member.bounds[0]).as_dvec3();
+    let [long, girth] = [size.length(), 2.0 * (size.x + size.y + size.z)];
+    let most = if course == Course::Along { long } else { 2.0 * girth };
+    (long > 0.0 && length > 1.05 * most).then(|| {
+        format!(
+            "{length} m is longer than a crack on {} can be, which is {long:.2} m from corner to corner: in m?",
+            called(member)
+        )
+    })
+}
+
+/// Strength that concrete and its bars hardly reach, kPa: what is more crushes the whole section.
+const CRUSHING_KPA: f64 = 100e3;
+
+/// Why a weight of a load test is doubted: it crushes its member's whole section, counted with its
+/// box, at 100 MPa; or it is less than a ten-thousandth of the member's own weight.
+fn doubt_weights(member: &Member, test: &Test) -> Option<String> {
+    let kn: f64 = test
+        .actions
+        .iter()
+        .map(|action| match action {
+            Action::Force { force_kn, .. } => f64::from(force_kn.length()),
+            _ => 0.0,
+        })
+        .sum();
+    let mut sides = (member.bounds[1] - member.bounds[0]).as_dvec3().to_array();
+    sides.sort_by(f64::total_cmp);
+    let [thin, thick, long] = sides;
+    let [crushing, weight] = [thin * thick * CRUSHING_KPA, 25.0 * thin * thick * long];
+    let remedy = if kn > crushing && crushing > 0.0 {
+        format!("more than crushes its section, some {crushing:.0} kN: in N?")
+    } else if kn > 0.0 && kn < 1e-4 * weight {
+        format!("less than a ten-thousandth of its weight, some {weight:.0} kN: in MN?")
+    } else {
+        return None;
+    };
+    Some(format!(
+        "load test {} of {}: {kn} kN is {remedy} give it in kN",
+        test.name,
+        called(member)
+    ))
 }
 
 /// The largest area that a finding tells, and its field.

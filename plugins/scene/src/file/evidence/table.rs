@@ -2,16 +2,24 @@
 
 use csv::{ReaderBuilder, StringRecord};
 use glam::Vec3;
+use intrados_stage::sheet::{self, DecimalMark, NumberStyle, StyleVerdict};
 
 use super::{
     Along, Face, Finding, Kind, Placed, Record, Survey,
     check::{check_record, check_seat},
+    day::{self, DayOrder},
+    layout::{Layout, lay_out},
+    units::{electrode, scale_of, split_unit},
 };
 use crate::{
     file::{edit_distance, nearest, shorten},
     problem::Problem,
     structure::{Date, Direction, Electrode, Measures},
 };
+
+mod doubt;
+
+pub(super) use doubt::{doubt_covers, doubt_profile};
 
 /// Most rows of a table.
 const MAX_ROWS: usize = 200_000;
@@ -25,7 +33,7 @@ const LEAST_STRAIN: f64 = 0.05e-6;
 
 /// What a column holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Column {
+pub(super) enum Column {
     Along,
     Face,
     Angle,
@@ -70,6 +78,48 @@ const COLUMNS: [(&str, Column); 19] = [
 const KINDS: &str = "one of mV, cover_mm, rebound, velocity_m_s, carbonation_mm, depth_mm with \
                      chloride_percent_cement, or gauge with value";
 
+/// Other names of columns, as loggers write them, and names that say their unit behind them.
+const OTHER_NAMES: [(&str, Column); 14] = [
+    ("timestamp", Column::Date),
+    ("datetime", Column::Date),
+    ("date/time", Column::Date),
+    ("time stamp", Column::Date),
+    ("height", Column::Height),
+    ("angle", Column::Angle),
+    ("temperature", Column::Temperature),
+    ("temp", Column::Temperature),
+    ("depth", Column::Depth),
+    ("cover", Column::Of(Kind::Cover)),
+    ("carbonation", Column::Of(Kind::Carbonation)),
+    ("velocity", Column::Of(Kind::Velocity)),
+    ("potential", Column::Of(Kind::HalfCell)),
+    ("half_cell", Column::Of(Kind::HalfCell)),
+];
+
+/// A column by its name, which has its unit in itself or behind it, and that unit.
+fn column_named<'a>(name: &'a str, below: &'a str) -> Option<(Column, &'a str)> {
+    let (base, unit) = split_unit(name);
+    let unit = if unit.is_empty() { below } else { unit };
+    let is_it = |(known, _): &&(&str, Column)| known.eq_ignore_ascii_case(base);
+    if let Some((_, column)) = COLUMNS.iter().find(is_it) {
+        return Some((*column, unit));
+    }
+    let (_, column) = OTHER_NAMES.iter().find(is_it)?;
+    (*column == Column::Date || !unit.trim_matches(['-', ' ']).is_empty())
+        .then_some((*column, unit))
+}
+
+/// Whether a cell names a column.
+pub(super) fn is_known(cell: &str) -> bool {
+    column_named(cell, "").is_some()
+}
+
+/// Whether a cell names a column of what was measured.
+pub(super) fn is_deciding(cell: &str) -> bool {
+    let found = column_named(cell, "").map(|(column, _)| column);
+    matches!(found, Some(Column::Of(_) | Column::OfCement | Column::OfConcrete | Column::Gauge))
+}
+
 impl Column {
     fn name(self) -> &'static str {
         COLUMNS.iter().find(|(_, column)| *column == self).map_or("", |(name, _)| name)
@@ -111,10 +161,10 @@ impl GaugeUnit {
         ("MPa", Self::MegaPascal),
     ];
 
-    fn named(name: &str) -> Option<Self> {
+    pub(super) fn named(name: &str) -> Option<Self> {
         let name = match name {
             // The Greek letter and the sign that looks like it.
-            "µε" | "με" | "um/m" | "µm/m" | "μm/m" => "ue",
+            "µε" | "με" | "um/m" | "µm/m" | "μm/m" | "microstrain" => "ue",
             "N/mm2" | "N/mm²" => "MPa",
             name => name,
         };
@@ -254,8 +304,8 @@ pub(crate) struct Seat {
 pub(crate) struct Rows {
     pub(crate) records: Vec<Placed<Record>>,
     pub(crate) readings: Vec<Placed<RawReading>>,
-    /// What was passed over, for people.
-    pub(crate) note: Option<String>,
+    /// What was passed over, assumed or doubted, for people.
+    pub(crate) notes: Vec<String>,
 }
 
 /// Reads a table. `file` is its name in messages.
@@ -263,36 +313,20 @@ pub(crate) struct Rows {
 /// # Errors
 /// All that is wrong with it, each with line and column.
 pub(crate) fn read(file: &str, bytes: &[u8], survey: &Survey) -> Result<Rows, Vec<Problem>> {
-    let table = Table::open(file, bytes, survey).map_err(|p| vec![p])?;
-    let rows = table.rows(bytes).map_err(|p| vec![p])?;
-    let mut out = Rows { note: table.note(), ..Rows::default() };
+    let one = |p: Problem| vec![p];
+    let layout = lay_out(file, bytes).map_err(one)?;
+    let mut table = Table::open(file, &layout, survey).map_err(one)?;
+    let records = table.records(&layout).map_err(one)?;
+    table.learn(&records).map_err(one)?;
+    let mut rows: Vec<Row> =
+        records.into_iter().map(|(line, cells)| Row { table: &table, line, cells }).collect();
+    let mut notes = table.all_notes(&layout);
+    notes.extend(doubt::leave_out(&table, &mut rows).map_err(one)?);
+    let mut out = Rows { notes, ..Rows::default() };
     let mut problems = Vec::new();
-    match table.holds {
-        Holds::One { kind, column } => {
-            for (n, row) in rows.iter().enumerate() {
-                let found = row.number(column).and_then(|value| {
-                    let factor = row.factor(kind, column)?;
-                    let error = row.optional(Column::StdError)?.map(|e| e * factor);
-                    let finding = finding(kind, value * factor, error, survey);
-                    table.record(row, format!("{} {}", survey.name, n + 1), finding)
-                });
-                take(found, &mut out.records, &mut problems);
-            }
-        }
-        Holds::Profiles { column } => {
-            let profiles: Vec<&[Row]> = rows.chunk_by(|a, b| a.same_place(b)).collect();
-            for (n, profile) in profiles.iter().enumerate() {
-                // The table has its own name already, however few profiles there are.
-                let name = format!("{} {}", survey.name, n + 1);
-                take(table.profile(profile, name, column), &mut out.records, &mut problems);
-            }
-        }
-        Holds::Gauges => {
-            for row in &rows {
-                take(table.reading(row), &mut out.readings, &mut problems);
-            }
-            problems.extend(table.hardly_strained(&out.readings));
-        }
+    table.take_rows(&rows, &mut out, &mut problems);
+    if problems.is_empty() {
+        problems.extend(doubt::sign_lost(&table, &out));
     }
     if !problems.is_empty() {
         problems.truncate(MAX_PROBLEMS);
@@ -309,7 +343,13 @@ pub(crate) fn read(file: &str, bytes: &[u8], survey: &Survey) -> Result<Rows, Ve
         problems.extend(wrong.into_iter().map(|p| Problem { place: reading.field(&p.place), ..p }));
     }
     problems.truncate(MAX_PROBLEMS);
-    if problems.is_empty() { Ok(out) } else { Err(problems) }
+    if !problems.is_empty() {
+        return Err(problems);
+    }
+    if !survey.confirmed {
+        out.notes.extend(doubt::doubt_rows(&table, &rows, &out));
+    }
+    Ok(out)
 }
 
 fn take<T>(
@@ -338,9 +378,20 @@ fn finding(kind: Kind, value: f64, error: Option<f64>, survey: &Survey) -> Findi
 /// What the rows of a table are.
 #[derive(Debug, Clone, Copy)]
 enum Holds {
-    One { kind: Kind, column: Column },
-    Profiles { column: Column },
+    One {
+        kind: Kind,
+        column: Column,
+    },
+    Profiles {
+        column: Column,
+    },
     Gauges,
+    /// A gauge a column.
+    Channels,
+    /// A place along the axis a row, and a place across a column.
+    Grid {
+        kind: Kind,
+    },
 }
 
 /// A table whose header is sound.
@@ -349,46 +400,63 @@ struct Table<'a> {
     survey: &'a Survey,
     /// None: a column that says nothing to us.
     columns: Vec<Option<Column>>,
-    /// Names of those.
+    /// What makes the numbers of each those of its column.
+    scales: Vec<[f64; 2]>,
+    /// Decimal marks of each.
+    marks: Vec<DecimalMark>,
+    /// Names of columns that say nothing to us.
     strange: Vec<String>,
+    /// Columns that hold what a gauge, or a place across, showed.
+    channels: Vec<Channel>,
+    /// The unit that a header gives to `value`.
+    value_unit: Option<String>,
+    days: Option<DayOrder>,
+    header: usize,
     separator: u8,
     holds: Holds,
+    notes: Vec<String>,
+}
+
+/// A column of a gauge, or of a place across a face.
+#[derive(Debug, Clone, PartialEq)]
+struct Channel {
+    index: usize,
+    name: String,
+    unit: Option<String>,
 }
 
 impl<'a> Table<'a> {
-    fn open(file: &'a str, bytes: &[u8], survey: &'a Survey) -> Result<Self, Problem> {
-        let wrong = |code, message: String| Err(Problem::error(file, code, message));
-        if bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]) {
-            return wrong("NOT_TEXT", "is UTF-16: save it as CSV in UTF-8".into());
+    fn open(file: &'a str, layout: &Layout, survey: &'a Survey) -> Result<Self, Problem> {
+        if layout.text.trim().is_empty() {
+            let message = format!("is empty: its first line names the columns, {KINDS}");
+            return Err(Problem::error(file, "EMPTY", message));
         }
-        if std::str::from_utf8(bytes).is_err() || bytes.contains(&0) {
-            let message = "is not UTF-8 text: save it as CSV in UTF-8 (a workbook is no CSV)";
-            return wrong("NOT_TEXT", message.into());
-        }
-        let first = bytes.split(|b| matches!(b, b'\n' | b'\r')).find(|line| !line.is_empty());
-        let Some(header) = first else {
-            return wrong("EMPTY", format!("is empty: its first line names the columns, {KINDS}"));
-        };
-        let separator = *[b';', b'\t'].iter().find(|s| header.contains(s)).unwrap_or(&b',');
         let mut table = Self {
             file,
             survey,
             columns: Vec::new(),
+            scales: Vec::new(),
+            marks: Vec::new(),
             strange: Vec::new(),
-            separator,
+            channels: Vec::new(),
+            value_unit: None,
+            days: None,
+            header: layout.header,
+            separator: layout.separator,
             holds: Holds::Profiles { column: Column::OfCement },
+            notes: Vec::new(),
         };
-        (table.columns, table.strange) = table.header(bytes)?;
+        table.header(layout)?;
         table.holds = table.told()?;
         Ok(table)
     }
 
-    fn reader<'b>(&self, bytes: &'b [u8]) -> csv::Reader<&'b [u8]> {
+    fn reader<'b>(&self, text: &'b str) -> csv::Reader<&'b [u8]> {
         ReaderBuilder::new()
             .delimiter(self.separator)
             .flexible(true)
             .trim(csv::Trim::All)
-            .from_reader(bytes.strip_prefix("\u{feff}".as_bytes()).unwrap_or(bytes))
+            .from_reader(text.as_bytes())
     }
 
     fn broken(&self, error: &csv::Error) -> Problem {
@@ -396,32 +464,110 @@ impl<'a> Table<'a> {
     }
 
     /// The columns by their names, and the names that nobody knows.
-    fn header(&self, bytes: &[u8]) -> Result<(Vec<Option<Column>>, Vec<String>), Problem> {
-        let mut reader = self.reader(bytes);
-        let names = reader.headers().map_err(|e| self.broken(&e))?;
-        let (mut columns, mut strange) = (Vec::new(), Vec::new());
-        for name in names {
-            let known = COLUMNS.iter().find(|(known, _)| known.eq_ignore_ascii_case(name));
-            let Some((name, column)) = known else {
-                if let Some(why) = mistaken(name) {
+    fn header(&mut self, layout: &Layout) -> Result<(), Problem> {
+        let mut reader = self.reader(&layout.text);
+        let names = reader.headers().map_err(|e| self.broken(&e))?.clone();
+        let is_wide = self.is_wide(&names, layout);
+        for (index, name) in names.iter().enumerate() {
+            let below = layout.units.get(index).map_or("", String::as_str);
+            let Some((column, unit)) = column_named(name, below) else {
+                let (base, unit) = split_unit(name);
+                let unit = if unit.is_empty() { below } else { unit };
+                if is_wide {
+                    let unit = Some(unit.to_owned()).filter(|u| !u.is_empty());
+                    self.channels.push(Channel { index, name: base.to_owned(), unit });
+                } else if let Some(why) = mistaken(name) {
                     return Err(self.in_header("UNKNOWN_COLUMN", why));
                 }
-                columns.push(None);
-                strange.push(name.to_owned());
+                self.columns.push(None);
+                self.scales.push([1.0, 0.0]);
+                self.strange.push(name.to_owned());
                 continue;
             };
-            if columns.contains(&Some(*column)) {
+            if self.has(column) {
+                let name = column.name();
                 let message = format!("the column {name} is there twice: keep one of them");
                 return Err(self.in_header("DUPLICATE", message));
             }
-            columns.push(Some(*column));
+            let scale = self.scale(column, unit)?;
+            self.scales.push(scale);
+            self.columns.push(Some(column));
         }
-        Ok((columns, strange))
+        Ok(())
+    }
+
+    /// Whether each column is of a gauge, or of a place across: none says what was measured, and
+    /// one says when or where.
+    fn is_wide(&self, names: &StringRecord, layout: &Layout) -> bool {
+        let known = |name: &str| column_named(name, "").map(|(column, _)| column);
+        let below = |index: usize| layout.units.get(index).map_or("", String::as_str);
+        let is_deciding =
+            |name: &str| is_deciding(name) || known(name).is_some_and(|c| c == Column::Value);
+        if names.iter().any(is_deciding) {
+            return false;
+        }
+        let has = |column: Column| names.iter().any(|name| known(name) == Some(column));
+        let mut others = names.iter().enumerate().filter(|(_, name)| known(name).is_none());
+        let of_gauge = |(index, name): (usize, &str)| {
+            let unit = split_unit(name).1;
+            let unit = if unit.is_empty() { below(index) } else { unit };
+            GaugeUnit::named(unit).is_some()
+        };
+        let is_logged = has(Column::Date) || has(Column::Test) || self.survey.test.is_some();
+        if is_logged && (self.survey.kind.is_none() && self.survey.unit.is_some()) {
+            return others.next().is_some();
+        }
+        let is_number = |(_, name): (usize, &str)| place_across(name).is_some();
+        let mut full = others.clone().filter(|(_, name)| !name.is_empty());
+        let is_grid = (has(Column::Height) || has(Column::Along))
+            && full.clone().next().is_some()
+            && full.all(is_number);
+        is_grid || is_logged && others.any(of_gauge)
+    }
+
+    /// What makes a column's numbers those of its name.
+    fn scale(&mut self, column: Column, unit: &str) -> Result<[f64; 2], Problem> {
+        if column == Column::Value {
+            self.value_unit = Some(unit.to_owned()).filter(|u| !u.trim_matches('-').is_empty());
+            return Ok([1.0, 0.0]);
+        }
+        let scale = scale_of(column, unit).ok_or_else(|| {
+            let (unit, name) = (shorten(unit), column.name());
+            let message = format!("{unit} is no unit of {name}: convert the column, or correct it");
+            self.in_header("UNIT", message)
+        })?;
+        let said = electrode(unit).filter(|_| column == Column::Of(Kind::HalfCell));
+        if let Some(said) = said.filter(|said| *said != self.survey.electrode) {
+            let message = format!(
+                "potentials are against {} by their header, and {} is given: correct one of them",
+                said.name(),
+                self.survey.electrode.name()
+            );
+            return Err(self.in_header("ELECTRODE", message));
+        }
+        let is_other = scale.iter().zip([1.0, 0.0]).any(|(a, b)| (a - b).abs() > f64::EPSILON);
+        if is_other {
+            let file = self.file;
+            let (unit, name) = (shorten(unit), column.name());
+            self.notes.push(format!("{file}: the column in {unit} was converted to {name}"));
+        }
+        Ok(scale)
+    }
+
+    /// All that was passed over or assumed.
+    fn all_notes(&self, layout: &Layout) -> Vec<String> {
+        let own = self.notes.iter().cloned();
+        layout.notes.iter().cloned().chain(own).chain(self.note()).collect()
     }
 
     /// Which columns were passed over.
     fn note(&self) -> Option<String> {
-        let names: Vec<&str> = self.strange.iter().map(String::as_str).collect();
+        let is_used = |name: &&str| {
+            let base = split_unit(name).0;
+            self.channels.iter().any(|channel| channel.name == base)
+        };
+        let names: Vec<&str> =
+            self.strange.iter().map(String::as_str).filter(|name| !is_used(name)).collect();
         let named: Vec<&str> = names.iter().copied().filter(|n| !n.is_empty()).collect();
         if named.is_empty() {
             return None;
@@ -436,7 +582,7 @@ impl<'a> Table<'a> {
     }
 
     fn in_header(&self, code: &'static str, message: String) -> Problem {
-        Problem::error(format!("{}:1", self.file), code, message)
+        Problem::error(format!("{}:{}", self.file, self.header), code, message)
     }
 
     fn has(&self, column: Column) -> bool {
@@ -444,7 +590,10 @@ impl<'a> Table<'a> {
     }
 
     /// What the columns say that the table holds.
-    fn told(&self) -> Result<Holds, Problem> {
+    fn told(&mut self) -> Result<Holds, Problem> {
+        if !self.channels.is_empty() {
+            return self.of_channels();
+        }
         let mut told = Vec::new();
         for &column in self.columns.iter().flatten() {
             match column {
@@ -490,7 +639,7 @@ impl<'a> Table<'a> {
     /// A column that says nothing beside what the table holds.
     fn stray(&self, holds: Holds) -> Option<String> {
         let profile = matches!(holds, Holds::Profiles { .. });
-        let gauges = matches!(holds, Holds::Gauges);
+        let gauges = matches!(holds, Holds::Gauges | Holds::Channels);
         let of_value = matches!(holds, Holds::One { column: Column::Value, .. });
         let is_stray = |column: &&Column| match column {
             Column::Depth => !profile && !gauges,
@@ -519,8 +668,9 @@ impl<'a> Table<'a> {
     fn unfit(&self, holds: Holds) -> Option<String> {
         let Survey { along, face, angle_deg, height_m, kind, unit, test, electrode, .. } =
             self.survey;
-        let gauges = matches!(holds, Holds::Gauges);
-        let of_value = matches!(holds, Holds::One { column: Column::Value, .. });
+        let gauges = matches!(holds, Holds::Gauges | Holds::Channels);
+        let of_value =
+            matches!(holds, Holds::One { column: Column::Value, .. } | Holds::Grid { .. });
         // The side of all gauges may be said once, where each row says how far along it is.
         let has_side = (face.is_some() || angle_deg.is_some()) && !self.has(Column::Along);
         if gauges && (along.is_some() || has_side || height_m.is_some()) {
@@ -529,7 +679,10 @@ impl<'a> Table<'a> {
             return Some(message.into());
         }
         // What the column itself says may be said again.
-        let own = if let Holds::One { kind, .. } = holds { Some(kind) } else { None };
+        let own = match holds {
+            Holds::One { kind, .. } | Holds::Grid { kind } => Some(kind),
+            _ => None,
+        };
         let own_unit = own.and_then(|k| k.units().first()).map(|(name, _)| *name);
         let stray = [
             ("kind", kind.is_some() && *kind != own),
@@ -569,25 +722,24 @@ impl<'a> Table<'a> {
 
     /// What is said, or not, of the unit of all rows; `None` where each row has to say it.
     fn unit_of_all(&self) -> Option<Option<&str>> {
-        let given = self.survey.unit.as_deref();
+        let given = self.survey.unit.as_deref().or(self.value_unit.as_deref());
         (given.is_some() || !self.has(Column::Unit)).then_some(given)
     }
 
-    /// All rows, with their lines.
-    fn rows<'b>(&'b self, bytes: &[u8]) -> Result<Vec<Row<'b>>, Problem> {
+    /// Cells of all rows, with their lines.
+    fn records(&self, layout: &Layout) -> Result<Vec<(usize, StringRecord)>, Problem> {
         let mut rows = Vec::new();
         // What the reader tells of a line is before the empty lines that it passes over.
-        let text = bytes.strip_prefix("\u{feff}".as_bytes()).unwrap_or(bytes);
-        let end = if text.contains(&b'\n') { b'\n' } else { b'\r' };
+        let text = layout.text.as_bytes();
         let (mut at, mut line) = (0, 1);
-        for record in self.reader(bytes).into_records() {
+        for record in self.reader(&layout.text).into_records() {
             let cells = record.map_err(|e| self.broken(&e))?;
             let mut begin = cells.position().map_or(0, csv::Position::byte) as usize;
-            while matches!(text.get(begin), Some(b'\n' | b'\r')) {
+            while text.get(begin) == Some(&b'\n') {
                 begin += 1;
             }
             line +=
-                text.get(at..begin).map_or(0, |part| part.iter().filter(|b| **b == end).count());
+                text.get(at..begin).map_or(0, |part| part.iter().filter(|b| **b == b'\n').count());
             at = begin;
             if cells.iter().all(str::is_empty) {
                 continue;
@@ -596,17 +748,265 @@ impl<'a> Table<'a> {
                 let message = format!("has more than {MAX_ROWS} rows: split it");
                 return Err(Problem::error(self.file, "TOO_MANY", message));
             }
-            let row = Row { table: self, line, cells };
-            if row.cells.len() > self.columns.len() {
-                return Err(row.too_wide());
+            if cells.len() > self.columns.len() {
+                return Err(self.too_wide(line, &cells));
             }
-            rows.push(row);
+            rows.push((line, cells));
         }
         if rows.is_empty() {
             let message = "has a header and no rows: put what was measured below it";
             return Err(Problem::error(self.file, "EMPTY", message));
         }
         Ok(rows)
+    }
+
+    fn too_wide(&self, line: usize, cells: &StringRecord) -> Problem {
+        let message = format!(
+            "has {} cells, and the header {}: was a decimal comma taken for a separator? part \
+             columns by ; or write decimal points",
+            cells.len(),
+            self.columns.len()
+        );
+        Problem::error(format!("{}:{line}", self.file), "TOO_WIDE", message)
+    }
+
+    /// Whether a column holds numbers.
+    fn is_numeric(&self, index: usize) -> bool {
+        match self.columns.get(index).copied().flatten() {
+            Some(Column::Face | Column::Date | Column::Gauge | Column::Test | Column::Unit) => {
+                false
+            }
+            Some(_) => true,
+            None => self.channels.iter().any(|channel| channel.index == index),
+        }
+    }
+
+    /// Learns from all cells how numbers and days are written.
+    fn learn(&mut self, records: &[(usize, StringRecord)]) -> Result<(), Problem> {
+        let date = self.columns.iter().position(|c| *c == Some(Column::Date));
+        if let Some(date) = date {
+            self.days = day::order(records.iter().filter_map(|(_, cells)| cells.get(date)));
+            let is_serial = |cell: &str| day::read(cell, self.days).is_ok_and(|d| d.is_serial);
+            let serial = records.iter().filter_map(|(_, cells)| cells.get(date));
+            if let Some(first) = serial.into_iter().find(|cell| is_serial(cell)) {
+                let day = day::read(first, self.days).map_or(String::new(), |d| d.date.to_string());
+                let file = self.file;
+                self.notes.push(format!(
+                    "{file}: days are a spreadsheet's numbers: {first} was read as {day}"
+                ));
+            }
+        }
+        let styles: Vec<NumberStyle> = (0..self.columns.len())
+            .map(|index| {
+                let mut style = NumberStyle::default();
+                if self.is_numeric(index) {
+                    let cells = records.iter().filter_map(|(_, cells)| cells.get(index));
+                    cells.for_each(|cell| style.learn(cell));
+                }
+                style
+            })
+            .collect();
+        let all = styles.iter().fold(NumberStyle::default(), |all, style| all.and(*style));
+        for (index, style) in styles.iter().enumerate() {
+            let cells: Vec<&str> = match style.is_open() {
+                true => records.iter().filter_map(|(_, cells)| cells.get(index)).collect(),
+                false => Vec::new(),
+            };
+            let mark = self.mark(index, *style, all, &cells)?;
+            self.marks.push(mark);
+        }
+        Ok(())
+    }
+
+    /// The decimal mark of a column.
+    fn mark(
+        &mut self,
+        index: usize,
+        style: NumberStyle,
+        all: NumberStyle,
+        cells: &[&str],
+    ) -> Result<DecimalMark, Problem> {
+        let name = self.columns.get(index).copied().flatten().map_or("value", Column::name);
+        let place = format!("{}: column {name}", self.file);
+        let mark = match style.verdict(all) {
+            StyleVerdict::Certain(mark) => mark,
+            StyleVerdict::Mixed => {
+                let message = "has decimal points and decimal commas: write all in one way";
+                return Err(Problem::error(place, "NO_NUMBER", message));
+            }
+            StyleVerdict::Open if !style.is_open() => return Ok(DecimalMark::Point),
+            StyleVerdict::Open => match self.likely_mark(index, cells) {
+                Some(mark) => mark,
+                None => {
+                    let first =
+                        shorten(cells.iter().find(|c| c.contains(['.', ','])).unwrap_or(&""));
+                    let message = format!(
+                        "{first} may be thousands or have three decimals, and no cell decides: write it without a mark that parts thousands, or with four decimals"
+                    );
+                    return Err(Problem::error(place, "AMBIGUOUS", message));
+                }
+            },
+        };
+        let parted = cells.iter().find_map(|cell| Some((cell, sheet::number(cell, mark)?)));
+        let is_parted = |cell: &&&str| sheet::number(cell, mark).is_some_and(|n| n.is_parted);
+        let file = self.file;
+        if let Some(cell) = cells.iter().find(is_parted) {
+            let value = sheet::number(cell, mark).map_or(0.0, |n| n.value);
+            let cell = shorten(cell);
+            self.notes.push(format!(
+                "{file}: the mark in {cell} of the column {name} parts thousands, as other cells show: read as {value}"
+            ));
+        } else if style.seems_parted(mark)
+            && let Some((cell, number)) = parted
+        {
+            let (cell, value) = (shorten(cell), number.value);
+            self.notes.push(format!(
+                "{file}: {cell} of the column {name} was read as {value}: does its mark part thousands? write it without"
+            ));
+        }
+        Ok(mark)
+    }
+
+    /// Of a column that may be read in two ways, the only one that its kind allows; in a table of
+    /// commas a point is a decimal point.
+    fn likely_mark(&self, index: usize, cells: &[&str]) -> Option<DecimalMark> {
+        let range = match (self.columns.get(index).copied().flatten()?, self.holds) {
+            (Column::Of(kind), _) | (Column::Value, Holds::One { kind, .. }) => usual_range(kind),
+            (Column::Depth, _) => [0.0, 500.0],
+            (Column::Along, _) => [0.0, 1.0],
+            (Column::Angle, _) => [-360.0, 360.0],
+            (Column::Temperature, _) => [-60.0, 90.0],
+            (Column::OfCement | Column::OfConcrete, _) => [0.0, 20.0],
+            _ => [f64::NEG_INFINITY, f64::INFINITY],
+        };
+        let fits = |mark: &DecimalMark| {
+            let numbers = cells.iter().filter_map(|cell| sheet::number(cell, *mark));
+            let [factor, more] = self.scales.get(index).copied().unwrap_or([1.0, 0.0]);
+            let mut scaled = numbers.map(|number| number.value * factor + more);
+            scaled.all(|value| (range[0]..=range[1]).contains(&value))
+        };
+        let marks = [DecimalMark::Point, DecimalMark::Comma];
+        let fit: Vec<DecimalMark> = marks.into_iter().filter(fits).collect();
+        let has_comma = cells.iter().any(|cell| cell.contains(','));
+        match fit[..] {
+            [one] => Some(one),
+            [_, _] if self.separator == b',' && !has_comma => Some(DecimalMark::Point),
+            _ => None,
+        }
+    }
+
+    /// What the rows say.
+    fn take_rows(&self, rows: &[Row], out: &mut Rows, problems: &mut Vec<Problem>) {
+        let survey = self.survey;
+        match self.holds {
+            Holds::One { kind, column } => {
+                for (n, row) in rows.iter().enumerate() {
+                    let found = row.number(column).and_then(|value| {
+                        let factor = row.factor(kind, column)?;
+                        let error = row.std_error(column)?.map(|e| e * factor);
+                        let finding = finding(kind, value * factor, error, survey);
+                        self.record(row, format!("{} {}", survey.name, n + 1), finding)
+                    });
+                    take(found, &mut out.records, problems);
+                }
+            }
+            Holds::Profiles { column } => {
+                let profiles = rows.chunk_by(Row::same_place);
+                for (n, profile) in profiles.enumerate() {
+                    // The table has its own name already, however few profiles there are.
+                    let name = format!("{} {}", survey.name, n + 1);
+                    take(self.profile(profile, name, column), &mut out.records, problems);
+                }
+            }
+            Holds::Gauges => {
+                for row in rows {
+                    take(self.reading(row), &mut out.readings, problems);
+                }
+                problems.extend(self.hardly_strained(&out.readings));
+            }
+            Holds::Channels => {
+                for (row, channel) in every(rows, &self.channels) {
+                    let Some(cell) = row.of_channel(channel) else { continue };
+                    take(self.channel(row, channel, cell), &mut out.readings, problems);
+                }
+                problems.extend(self.hardly_strained(&out.readings));
+            }
+            Holds::Grid { kind } => {
+                for (n, (row, channel)) in every(rows, &self.channels).enumerate() {
+                    let Some(cell) = row.of_channel(channel) else { continue };
+                    let found = row.parse(channel.index, cell, Column::Value).and_then(|value| {
+                        let factor = row.factor(kind, Column::Value)?;
+                        let finding = finding(kind, value * factor, None, survey);
+                        self.record(row, format!("{} {}", survey.name, n + 1), finding)
+                    });
+                    take(found, &mut out.records, problems);
+                }
+            }
+        }
+        if out.records.is_empty() && out.readings.is_empty() && problems.is_empty() {
+            let message = "no row of it can be used: take out what is none of a measurement";
+            problems.push(Problem::error(self.file, "EMPTY", message));
+        }
+    }
+
+    /// Tables of a gauge, or a place across, a column.
+    fn of_channels(&mut self) -> Result<Holds, Problem> {
+        let is_grid =
+            self.channels.iter().all(|c| c.name.is_empty() || place_across(&c.name).is_some())
+                && !self.has(Column::Date);
+        let of_all = self.survey.unit.clone();
+        if is_grid {
+            self.channels.retain(|channel| !channel.name.is_empty());
+            let kind = self.survey.kind.unwrap_or(Kind::HalfCell);
+            let given = of_all.as_deref().or(kind.units().first().map(|(name, _)| *name));
+            unit(Some(kind), given.filter(|name| !name.is_empty()))
+                .map_err(|why| self.in_header("UNIT", format!("the unit of the grid {why}")))?;
+            self.value_unit = given.filter(|name| !name.is_empty()).map(str::to_owned);
+            return match self.unfit(Holds::Grid { kind }) {
+                Some(message) => Err(self.in_header("UNFIT", message)),
+                None => Ok(Holds::Grid { kind }),
+            };
+        }
+        let is_gauge = |channel: &Channel| {
+            let unit = channel.unit.as_deref().or(of_all.as_deref());
+            !channel.name.is_empty() && unit.and_then(GaugeUnit::named).is_some()
+        };
+        self.channels.retain(is_gauge);
+        let mut names: Vec<&str> = self.channels.iter().map(|c| c.name.as_str()).collect();
+        names.sort_unstable();
+        if let Some([one, _]) = names.windows(2).find(|pair| pair[0] == pair[1]) {
+            let message = format!("the column {} is there twice: keep one of them", shorten(one));
+            return Err(self.in_header("DUPLICATE", message));
+        }
+        if self.channels.is_empty() {
+            let message = "no column has a unit of a gauge: give the unit ue, m/m, mm, m or MPa";
+            return Err(self.in_header("NO_UNIT", message.into()));
+        }
+        let stray = [Column::Height, Column::Along, Column::Face, Column::Angle, Column::Depth];
+        if let Some(column) = stray.into_iter().find(|column| self.has(*column)) {
+            let message = format!(
+                "the column {} is none of a table with a gauge a column: say where gauges are in evidence.ron",
+                column.name()
+            );
+            return Err(self.in_header("UNFIT", message));
+        }
+        match self.unfit(Holds::Channels) {
+            Some(message) => Err(self.in_header("UNFIT", message)),
+            None => Ok(Holds::Channels),
+        }
+    }
+
+    /// What a gauge that has a column of its own showed in a row.
+    fn channel(
+        &self,
+        row: &Row,
+        channel: &Channel,
+        cell: &str,
+    ) -> Result<Placed<RawReading>, Problem> {
+        let shown = row.parse(channel.index, cell, Column::Value)?;
+        let said = channel.unit.as_deref().or(self.survey.unit.as_deref());
+        let unit = gauge_unit(said).map_err(|why| row.wrong(Column::Value, "NO_UNIT", why))?;
+        self.shown(row, channel.name.clone(), None, shown, unit)
     }
 
     /// A row as a record.
@@ -626,6 +1026,7 @@ impl<'a> Table<'a> {
             height_m: row.optional(Column::Height)?.map(|h| h as f32).or(survey.height_m),
             instrument: survey.instrument.clone(),
             picture: None,
+            confirmed: survey.confirmed,
             shows,
         };
         Ok(Placed { place: row.place(), is_row: true, what })
@@ -641,7 +1042,7 @@ impl<'a> Table<'a> {
         let numbers = |column| rows.iter().map(|r| r.number(column)).collect::<Result<Vec<_>, _>>();
         let (depths_mm, percents) = (numbers(Column::Depth)?, numbers(column)?);
         rows.iter().try_for_each(|row| row.is_percent(column))?;
-        let errors: Result<Vec<_>, _> = rows.iter().map(|r| r.optional(Column::StdError)).collect();
+        let errors: Result<Vec<_>, _> = rows.iter().map(|r| r.std_error(column)).collect();
         let of_cement = column == Column::OfCement;
         let shows = Finding::Chloride {
             depths_mm,
@@ -663,6 +1064,19 @@ impl<'a> Table<'a> {
         let shown = row.number(Column::Value)?;
         let unit =
             gauge_unit(row.unit()?).map_err(|why| row.wrong(Column::Unit, "NO_UNIT", why))?;
+        let seat = self.seat(row)?;
+        self.shown(row, of.to_owned(), seat, shown, unit)
+    }
+
+    /// What a gauge showed.
+    fn shown(
+        &self,
+        row: &Row,
+        of: String,
+        seat: Option<Seat>,
+        shown: f64,
+        unit: GaugeUnit,
+    ) -> Result<Placed<RawReading>, Problem> {
         if let Some(why) = unit.absurd(shown) {
             return Err(row.wrong(Column::Value, "UNIT", why));
         }
@@ -677,9 +1091,12 @@ impl<'a> Table<'a> {
         };
         let test = row.text(Column::Test).map(str::to_owned).or(self.survey.test.clone());
         let member = self.survey.member.clone();
-        let (of, seat) = (of.to_owned(), self.seat(row)?);
-        let (date, temperature_c) =
-            (row.date()?.or(self.survey.date), row.optional(Column::Temperature)?);
+        let date = row.date()?.or(self.survey.date);
+        let day_to_come = date.filter(|d| !self.survey.confirmed && d.is_to_come());
+        if let Some(date) = day_to_come {
+            return Err(row.wrong(Column::Date, "FUTURE", super::check::to_come(date)));
+        }
+        let temperature_c = row.optional(Column::Temperature)?;
         if let Some(celsius) = temperature_c.filter(|c| !(-60.0..=90.0).contains(c)) {
             let message = format!("{celsius} °C is outside -60 to 90: is it Fahrenheit or kelvin?");
             return Err(row.wrong(Column::Temperature, "RANGE", message));
@@ -734,7 +1151,7 @@ impl<'a> Table<'a> {
             (_, field) if field.starts_with("shows.std_error") => Column::StdError,
             (_, field) if field.starts_with("shows.depths") => Column::Depth,
             (Holds::One { column, .. } | Holds::Profiles { column }, _) => column,
-            (Holds::Gauges, _) => Column::Value,
+            (Holds::Gauges | Holds::Channels | Holds::Grid { .. }, _) => Column::Value,
         };
         column.name()
     }
@@ -750,6 +1167,34 @@ fn mistaken(name: &str) -> Option<String> {
     };
     let is_known = COLUMNS.iter().map(|(name, _)| *name).any(|known| nearly(&known));
     (is_known || POTENTIALS.contains(&lower.as_str())).then(|| unknown_column(name))
+}
+
+/// Every row with every channel.
+fn every<'r, 't>(
+    rows: &'r [Row<'t>],
+    channels: &'r [Channel],
+) -> impl Iterator<Item = (&'r Row<'t>, &'r Channel)> {
+    rows.iter().flat_map(move |row| channels.iter().map(move |channel| (row, channel)))
+}
+
+/// A place across a face, as the header of a grid tells it.
+fn place_across(name: &str) -> Option<f64> {
+    let base = split_unit(name).0;
+    let base = base.trim_end_matches(['m', ' ']);
+    [DecimalMark::Point, DecimalMark::Comma]
+        .into_iter()
+        .find_map(|mark| sheet::number(base, mark))
+        .map(|number| number.value)
+}
+
+/// What a kind of measurement shows at least and at most, in the unit of its own column.
+fn usual_range(kind: Kind) -> [f64; 2] {
+    match kind {
+        Kind::Cover | Kind::Carbonation => [0.0, 500.0],
+        Kind::Rebound => [10.0, 100.0],
+        Kind::Velocity => [300.0, 8000.0],
+        Kind::HalfCell => [-1500.0, 1000.0],
+    }
 }
 
 /// Names of potentials that say no unit.
@@ -792,14 +1237,9 @@ impl Row<'_> {
         Problem::error(format!("{}: column {}", self.place(), column.name()), code, message)
     }
 
-    fn too_wide(&self) -> Problem {
-        let message = format!(
-            "has {} cells, and the header {}: was a decimal comma taken for a separator? part \
-             columns by ; or write decimal points",
-            self.cells.len(),
-            self.table.columns.len()
-        );
-        Problem::error(self.place(), "TOO_WIDE", message)
+    /// What a column of a gauge shows; `None`: nothing, as loggers write gaps.
+    fn of_channel(&self, channel: &Channel) -> Option<&str> {
+        self.cells.get(channel.index).filter(|cell| !doubt::is_gap(cell))
     }
 
     /// What a cell holds, if it holds anything.
@@ -809,24 +1249,31 @@ impl Row<'_> {
     }
 
     fn optional(&self, column: Column) -> Result<Option<f64>, Problem> {
-        let Some(cell) = self.text(column) else { return Ok(None) };
-        let points = cell.replace('\u{2212}', "-");
-        let points = match (points.contains(','), points.contains('.')) {
-            (true, false) if self.table.separator != b',' => points.replace(',', "."),
-            _ => points,
-        };
-        match points.parse::<f64>() {
-            Ok(number) if number.is_finite() => Ok(Some(number)),
-            _ => {
-                let hint = if cell.contains(',') {
-                    ": write decimals with a point, and no separator of thousands"
-                } else {
-                    ": write a number alone, without its unit"
-                };
-                let message = format!("\"{}\" is no number{hint}", shorten(cell));
-                Err(self.wrong(column, "NO_NUMBER", message))
-            }
-        }
+        let index = self.table.columns.iter().position(|c| *c == Some(column));
+        let Some((index, cell)) = index.zip(self.text(column)) else { return Ok(None) };
+        let [factor, more] = self.table.scales.get(index).copied().unwrap_or([1.0, 0.0]);
+        self.parse(index, cell, column).map(|number| Some(number * factor + more))
+    }
+
+    /// A cell's number as it is written.
+    fn parse(&self, index: usize, cell: &str, column: Column) -> Result<f64, Problem> {
+        let mark = self.table.marks.get(index).copied().unwrap_or(DecimalMark::Point);
+        sheet::number(cell, mark).map(|number| number.value).ok_or_else(|| {
+            let hint = if cell.contains(',') {
+                ": write decimals with a point, and no separator of thousands"
+            } else {
+                ": write a number alone, without its unit"
+            };
+            let message = format!("\"{}\" is no number{hint}", shorten(cell));
+            self.wrong(column, "NO_NUMBER", message)
+        })
+    }
+
+    /// A standard error, in the unit of its value.
+    fn std_error(&self, of: Column) -> Result<Option<f64>, Problem> {
+        let index = self.table.columns.iter().position(|c| *c == Some(of));
+        let factor = index.and_then(|i| self.table.scales.get(i)).map_or(1.0, |scale| scale[0]);
+        Ok(self.optional(Column::StdError)?.map(|error| error * factor))
     }
 
     fn number(&self, column: Column) -> Result<f64, Problem> {
@@ -836,7 +1283,8 @@ impl Row<'_> {
 
     /// In which unit its value is: as the row says, or as is said of all.
     fn unit(&self) -> Result<Option<&str>, Problem> {
-        let (own, of_all) = (self.text(Column::Unit), self.table.survey.unit.as_deref());
+        let of_all = self.table.survey.unit.as_deref().or(self.table.value_unit.as_deref());
+        let own = self.text(Column::Unit);
         // Units of gauges may be written in several ways.
         let differ = |a: &str, b: &str| {
             a != b && GaugeUnit::named(a).is_none_or(|unit| GaugeUnit::named(b) != Some(unit))
@@ -895,11 +1343,10 @@ impl Row<'_> {
 
     fn date(&self) -> Result<Option<Date>, Problem> {
         let Some(cell) = self.text(Column::Date) else { return Ok(None) };
-        // The hour says nothing here.
-        let day = cell.split(['T', ' ']).next().unwrap_or(cell);
-        day.parse()
-            .map(Some)
-            .map_err(|why| self.wrong(Column::Date, "DATE", format!("\"{}\" {why}", shorten(cell))))
+        let day = day::read(cell, self.table.days).map_err(|why| {
+            self.wrong(Column::Date, "DATE", format!("\"{}\" {why}", shorten(cell)))
+        })?;
+        Ok(Some(day.date))
     }
 
     /// Whether two rows tell of one profile.

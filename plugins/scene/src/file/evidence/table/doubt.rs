@@ -1,0 +1,271 @@
+//! What a table holds that is probably not meant. What cannot be believed is not used until it is
+//! confirmed: what instruments write where they measured nothing, potentials that have lost their
+//! sign. What is only odd is used, and said.
+
+use std::collections::{HashMap, HashSet};
+
+use super::{Column, Finding, Holds, Kind, Problem, Row, Rows, Table};
+
+/// What instruments and loggers write where they measured nothing, whatever the sign.
+const SENTINELS: [f64; 20] = [
+    999.0,
+    9999.0,
+    99_999.0,
+    999_999.0,
+    9_999_999.0,
+    99_999_999.0,
+    999.9,
+    9999.9,
+    999.99,
+    9999.99,
+    99.9,
+    99.99,
+    888.0,
+    8888.0,
+    6999.0,
+    7999.0,
+    32_767.0,
+    32_768.0,
+    65_535.0,
+    2_147_483_647.0,
+];
+/// Of this size nothing was measured.
+const HUGE: f64 = 1e9;
+/// How far beyond all others a value is that is taken for one of these.
+const BEYOND: f64 = 1.5;
+
+/// Remedy of all that is doubted.
+const CONFIRM: &str = "confirm the table (confirmed: true, attach --confirmed)";
+
+/// Whether a cell of a logger holds nothing.
+pub(super) fn is_gap(cell: &str) -> bool {
+    let cell = cell.trim();
+    let words =
+        ["nan", "na", "n/a", "#n/a", "null", "none", "inf", "-inf", "ovl", "ol", "overflow"];
+    cell.chars().all(|c| matches!(c, '-' | '*' | '\u{2014}' | '\u{2013}'))
+        || words.contains(&cell.to_ascii_lowercase().as_str())
+}
+
+/// Leaves out rows, and cells of loggers, that hold what instruments write where they measured
+/// nothing; says which.
+pub(super) fn leave_out(table: &Table, rows: &mut Vec<Row>) -> Result<Option<String>, Problem> {
+    if table.survey.confirmed {
+        return Ok(None);
+    }
+    let mut found: Vec<(usize, String)> = Vec::new();
+    for index in value_columns(table) {
+        let raw = |row: &Row| {
+            let cell = row.cells.get(index).filter(|cell| !cell.is_empty())?;
+            row.parse(index, cell, Column::Value).ok()
+        };
+        let values: Vec<Option<f64>> = rows.iter().map(raw).collect();
+        let is_positive = is_positive(table, index);
+        let others = values.iter().flatten().filter(|v| !is_listed(**v)).map(|v| v.abs());
+        let most = others.reduce(f64::max);
+        let is_one = |value: f64| {
+            is_listed(value)
+                && (is_positive && value < 0.0
+                    || most.is_none_or(|most| value.abs() > BEYOND * most))
+        };
+        let ones: Vec<usize> = values
+            .iter()
+            .enumerate()
+            .filter_map(|(n, value)| value.filter(|v| is_one(*v)).map(|_| n))
+            .collect();
+        for n in ones {
+            if let Some(row) = rows.get_mut(n) {
+                let cell = row.cells.get(index).unwrap_or_default().to_owned();
+                found.push((row.line, cell));
+                row.cells = row
+                    .cells
+                    .iter()
+                    .enumerate()
+                    .map(|(i, c)| if i == index { "" } else { c })
+                    .collect();
+            }
+        }
+    }
+    if !matches!(table.holds, Holds::Channels | Holds::Grid { .. }) {
+        let lines: HashSet<usize> = found.iter().map(|(line, _)| *line).collect();
+        rows.retain(|row| !lines.contains(&row.line));
+    }
+    let Some((line, cell)) = found.first() else { return Ok(None) };
+    let more = match found.len() {
+        1 => String::new(),
+        n => format!(" and {} more like it", n - 1),
+    };
+    let message = format!(
+        "{}:{line}: {cell}{more} not used: instruments write it where they measured nothing; take it out, or {CONFIRM}",
+        table.file
+    );
+    match rows.is_empty() {
+        true => Err(Problem::error(table.file, "NOTHING_MEASURED", message)),
+        false => Ok(Some(message)),
+    }
+}
+
+/// Columns of what was measured.
+fn value_columns(table: &Table) -> Vec<usize> {
+    let column = match table.holds {
+        Holds::One { column, .. } | Holds::Profiles { column } => column,
+        Holds::Gauges => Column::Value,
+        Holds::Channels | Holds::Grid { .. } => {
+            return table.channels.iter().map(|channel| channel.index).collect();
+        }
+    };
+    table.columns.iter().position(|c| *c == Some(column)).into_iter().collect()
+}
+
+/// Whether what a column holds is never below 0.
+fn is_positive(table: &Table, index: usize) -> bool {
+    let kind = match (table.holds, table.columns.get(index).copied().flatten()) {
+        (Holds::Profiles { .. }, _) => return true,
+        (Holds::One { kind, .. } | Holds::Grid { kind }, _) => kind,
+        _ => return false,
+    };
+    kind != Kind::HalfCell
+}
+
+fn is_listed(value: f64) -> bool {
+    let size = value.abs();
+    size >= HUGE || SENTINELS.iter().any(|one| (one - size).abs() < 1e-9 * size)
+}
+
+/// Potential below which its sign is doubted, mV: steel in dry concrete shows little more.
+const POSITIVE: f64 = 50.0;
+
+/// Refuses potentials none of which is negative.
+pub(super) fn sign_lost(table: &Table, out: &Rows) -> Option<Problem> {
+    let potentials = || {
+        out.records.iter().filter_map(|record| match record.what.shows {
+            Finding::HalfCell { mv, .. } => Some((mv, record)),
+            _ => None,
+        })
+    };
+    let (most, first) = potentials().max_by(|a, b| a.0.total_cmp(&b.0))?;
+    let lost = most > POSITIVE && potentials().all(|(mv, _)| mv >= 0.0);
+    (lost && !table.survey.confirmed).then(|| {
+        let message = format!(
+            "{most} mV, and none of the table is negative: was the sign lost? write -{most}, or {CONFIRM}"
+        );
+        Problem::error(first.field("mV"), "SIGN", message)
+    })
+}
+
+/// What of a table is odd, and used.
+pub(super) fn doubt_rows(table: &Table, rows: &[Row], out: &Rows) -> Vec<String> {
+    let values = |kind: &str| -> Vec<f64> {
+        let of_kind = out.records.iter().filter(|record| record.what.shows.kind() == kind);
+        of_kind
+            .filter_map(|record| match record.what.shows {
+                Finding::Cover { mm, .. } | Finding::Carbonation { mm, .. } => Some(mm),
+                _ => None,
+            })
+            .collect()
+    };
+    let profiles = out.records.iter().filter_map(|record| match &record.what.shows {
+        Finding::Chloride { depths_mm, percent_of_cement, percent_of_concrete, .. } => {
+            doubt_profile(depths_mm, percent_of_cement, percent_of_concrete)
+        }
+        _ => None,
+    });
+    let warm = out.readings.iter().filter_map(|r| r.what.temperature_c).reduce(f64::max);
+    let said = [
+        doubt_covers(&values("cover")),
+        doubt_carbonation(&values("carbonation")),
+        profiles.into_iter().next(),
+        warm.filter(|celsius| *celsius > WARM).map(|celsius| {
+            format!(
+                "temperature_c reaches {celsius} °C: in °F? name the column \"temperature [°F]\", or confirm it"
+            )
+        }),
+        doubt_repeats(table, rows),
+    ];
+    said.into_iter().flatten().map(|doubt| format!("{}: {doubt}", table.file)).collect()
+}
+
+/// Concrete of a bridge is not warmer, °C.
+const WARM: f64 = 55.0;
+/// Covers of which none is more are doubted, mm: less than any code asks for.
+const THIN: f64 = 6.0;
+
+/// Covers in cm or inch.
+pub(crate) fn doubt_covers(covers: &[f64]) -> Option<String> {
+    let most = covers.iter().copied().reduce(f64::max).filter(|most| *most < THIN)?;
+    Some(format!(
+        "no cover is above {most} mm: in cm, {} mm, or in inches, {} mm? name the unit, \"cover [cm]\", or {CONFIRM}",
+        short(10.0 * most),
+        short(25.4 * most)
+    ))
+}
+
+/// Depths in cm: none is 10, and some have decimals that nobody reads on a ruler of millimetres.
+fn doubt_carbonation(depths: &[f64]) -> Option<String> {
+    let most = depths.iter().copied().reduce(f64::max).filter(|most| *most < 10.0)?;
+    let is_fine = |mm: &&f64| ((**mm * 2.0).round() - **mm * 2.0).abs() > 1e-9;
+    (depths.iter().filter(is_fine).count() > 1).then(|| {
+        format!(
+            "no depth of carbonation is above {most} mm, and they have decimals: in cm, {} mm? name the unit, \"carbonation [cm]\", or {CONFIRM}",
+            short(10.0 * most)
+        )
+    })
+}
+
+/// Least content at the surface of what chlorides have entered, % of cement; the usual analysis
+/// finds no less than .01 % of concrete.
+const LITTLE: f64 = 0.03;
+/// Content that no analysis finds, % of cement.
+const NOTHING: f64 = 0.005;
+/// Samples above this depth alone are doubted, mm: dust of one or two drill steps.
+const SHALLOW: f64 = 5.0;
+
+/// A content as a fraction, or depths in cm.
+pub(crate) fn doubt_profile(depths: &[f64], cement: &[f64], concrete: &[f64]) -> Option<String> {
+    let percents = if cement.is_empty() { concrete } else { cement };
+    // Of concrete it is a seventh of what it is of cement.
+    let share = if cement.is_empty() { 1.0 / 7.0 } else { 1.0 };
+    let most = percents.iter().copied().reduce(f64::max).filter(|most| *most > 0.0)?;
+    let least = percents.iter().copied().reduce(f64::min).unwrap_or(most);
+    let falls = percents.windows(2).all(|pair| pair[1] <= pair[0]) && most > 2.0 * least;
+    if most < NOTHING * share || most < LITTLE * share && falls && percents.len() > 1 {
+        return Some(format!(
+            "no chloride is above {most} %: as a fraction, {} %? give per cent, or {CONFIRM}",
+            short(100.0 * most)
+        ));
+    }
+    let deepest = depths.iter().copied().reduce(f64::max)?;
+    (depths.len() > 1 && deepest < SHALLOW).then(|| {
+        format!(
+            "no sample is deeper than {deepest} mm: in cm, {} mm? name the unit, \"depth [cm]\", or {CONFIRM}",
+            short(10.0 * deepest)
+        )
+    })
+}
+
+fn short(value: f64) -> f64 {
+    (value * 1e3).round() / 1e3
+}
+
+/// Rows that repeat others in every cell, and say where.
+fn doubt_repeats(table: &Table, rows: &[Row]) -> Option<String> {
+    let is_placed = table.has(Column::Along) || table.has(Column::Height);
+    let is_profile = matches!(table.holds, Holds::Profiles { .. } | Holds::Grid { .. });
+    if !is_placed && !table.has(Column::Date) || is_profile {
+        return None;
+    }
+    let mut first: HashMap<Vec<&str>, usize> = HashMap::with_capacity(rows.len());
+    let (mut count, mut example) = (0, None);
+    for row in rows {
+        let line = *first.entry(row.cells.iter().collect()).or_insert(row.line);
+        if line != row.line {
+            count += 1;
+            example = example.or(Some((row.line, line)));
+        }
+    }
+    // Numbers without decimals are often alike at one place.
+    let often = 3 * count >= rows.len();
+    let (line, before) = example.filter(|_| often)?;
+    Some(format!(
+        "line {line} repeats line {before} in every cell, {count} rows in all: each counts; take out what was measured once, or {CONFIRM}"
+    ))
+}
