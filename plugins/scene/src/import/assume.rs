@@ -234,9 +234,6 @@ fn hoops(per_metre: f64, most: f64) -> (f32, f32) {
     (diameter as f32, ((100.0 * spacing).floor() * 10.0).max(20.0) as f32)
 }
 
-/// Weight of reinforced concrete, N/m³ (EN 1991-1-1, table A.1).
-const WEIGHT: f64 = 25e3;
-
 /// The least share of the length of its bars and stirrups that must lie in a member.
 const INSIDE: f64 = 0.7;
 /// Lines and points of each that are looked at.
