@@ -31,6 +31,7 @@ mod lengths;
 mod light_line;
 mod line;
 mod log;
+mod machine;
 mod members;
 mod meters;
 mod moment;

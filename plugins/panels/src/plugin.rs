@@ -10,10 +10,10 @@ use intrados_stage::Stage;
 use crate::{
     Actions, AddPanel, Banners, Language, Latest, Log, Look, Place, Refine, Selection, Statistics,
     Viewpoint, action, attach, banner, border, command, convergence, create, ct, dialog,
-    directions, drops, edits, export, fields, history, inspector, layout, light_line, log, members,
-    meters, moment, outline, photos, picture, place::Panels, play, prediction, recent, reference,
-    refine, render, report, saving, session, sheet, smooth, statistics, steering, stress,
-    structure, toast, trail, viewpoint, views, workspace,
+    directions, drops, edits, export, fields, history, inspector, layout, light_line, log,
+    machine::MachineSetup, members, meters, moment, outline, photos, picture, place::Panels, play,
+    prediction, recent, reference, refine, render, report, saving, session, sheet, smooth,
+    statistics, steering, stress, structure, toast, trail, viewpoint, views, workspace,
 };
 
 /// Adds the window's state and the built-in panels. It opens no window: whoever has one calls
@@ -41,14 +41,6 @@ pub struct PanelsPlugin {
     pub documents: Option<PathBuf>,
     /// The program that prints reports as PDF; `None`: the window offers none.
     pub pdf_printer: Option<PathBuf>,
-}
-
-/// What the window takes from the machine that it runs on. All of it comes through
-/// [`PanelsPlugin`], so that a window without such settings looks the same on every machine.
-#[derive(Resource)]
-pub(crate) struct MachineSetup {
-    pub(crate) documents: Option<PathBuf>,
-    pub(crate) pdf_printer: Option<PathBuf>,
 }
 
 impl PanelsPlugin {

@@ -19,7 +19,7 @@ use intrados_stage::{
 
 use crate::{
     Action, Actions, Banners, Latest, Log, album, destination::Destination, export::write_png,
-    lang::term, plugin::MachineSetup, report, toast::Toasts,
+    lang::term, machine::MachineSetup, report, toast::Toasts,
 };
 
 /// So long tools are put away for a picture: where the system gives none, they come back.
