@@ -302,6 +302,6 @@ mod tests {
         // Accepted and quit again before its scene was there: nothing is lost.
         again.coming = again.left.take();
         drop(again);
-        assert!(Session::read(Some(file)).left.is_some_and(|left| left.has_unsaved()));
+        assert!(Session::read(Some(file)).left.as_ref().is_some_and(Kept::has_unsaved));
     }
 }

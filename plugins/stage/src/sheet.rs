@@ -249,7 +249,7 @@ fn plain_number(cell: &str) -> Cow<'_, str> {
     };
     let first = parts.first().map_or("", |part| part.trim_start_matches(['-', '+']));
     let is_first = matches!(first.len(), 1..=3) && first.bytes().all(|b| b.is_ascii_digit());
-    if parts.len() > 1 && is_first && parts.iter().skip(1).all(|part| is_group(&part)) {
+    if parts.len() > 1 && is_first && parts.iter().skip(1).all(is_group) {
         return Cow::Owned(parts.concat());
     }
     Cow::Owned(text)

@@ -228,7 +228,7 @@ fn of_table(
     let path = std::path::absolute(path).map_err(|e| Failure::no_input(path, &e))?;
     let (table, hash) = super::network::read(&path)?;
     for doubt in &table.doubts {
-        session.note(&format!("{}: {doubt}", path.display()));
+        session.note(format!("{}: {doubt}", path.display()));
     }
     let rows = table.bridges.len().min(args.first.unwrap_or(usize::MAX));
     if rows == 0 {

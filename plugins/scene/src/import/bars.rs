@@ -34,7 +34,7 @@ pub(super) fn is_link(element: &Element, course: &Course) -> bool {
     if says.iter().any(|role| ROLES.contains(role)) {
         return true;
     }
-    if says.iter().any(|role| *role == "MAIN") {
+    if says.contains(&"MAIN") {
         return course.line.first() == course.line.last() && course.line.len() > 2;
     }
     let names = element.words.iter().chain([&element.name]).map(|n| n.to_lowercase());

@@ -104,13 +104,13 @@ fn misplaced(told: &mut Georeference) -> Option<String> {
             "the site is said to be at 0° N, 0° E, in the sea off Africa: nobody gave a place, and it is left out; {remedy}"
         ));
     }
-    if let Some((a, b)) = told.map.as_ref().and_then(of_utm) {
-        if (latitude - a).abs() > 0.5 || (longitude - b).abs() > 4.0 {
-            return Some(format!(
-                "the site is said to be at {at}, and its map coordinates lie near {}: one of them is wrong or a default; {remedy}",
-                words(a, b)
-            ));
-        }
+    if let Some((a, b)) = told.map.as_ref().and_then(of_utm)
+        && ((latitude - a).abs() > 0.5 || (longitude - b).abs() > 4.0)
+    {
+        return Some(format!(
+            "the site is said to be at {at}, and its map coordinates lie near {}: one of them is wrong or a default; {remedy}",
+            words(a, b)
+        ));
     }
     if latitude.fract() == 0.0 && longitude.fract() == 0.0 {
         return Some(format!(

@@ -304,7 +304,7 @@ fn class_b(upper: &str, origin: Origin) -> Option<Reading> {
     let number = number?;
     if (100.0..=600.0).contains(&number) {
         // B500 and B550 are steel of bars.
-        let is_mark = [120.0, 160.0, 225.0, 300.0, 450.0, 600.0].iter().any(|m| *m == number);
+        let is_mark = [120.0, 160.0, 225.0, 300.0, 450.0, 600.0].contains(&number);
         return if is_mark {
             mark(number, "B", "Germany, Austria, Switzerland before 1972")
         } else {

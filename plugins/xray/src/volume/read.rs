@@ -34,7 +34,7 @@ enum Source {
     /// One TIFF, one page a slice. The decoder is away only while a page is read.
     Pages(Option<Box<Pages>>, u64),
     Raw(Raw),
-    Dicom(Series),
+    Dicom(Box<Series>),
 }
 
 impl std::fmt::Debug for Reader {
@@ -163,7 +163,7 @@ impl Reader {
         // A single slice needs no distance to the next one.
         let known = (pixel && (all || grid.size[2] == 1)).then_some(grid.voxel);
         let grid = Grid::centred(grid.size, known_voxel(&path, voxel, known)?);
-        Ok(Self { source: Source::Dicom(series), grid, path, told, doubts })
+        Ok(Self { source: Source::Dicom(Box::new(series)), grid, path, told, doubts })
     }
 
     fn pages(
