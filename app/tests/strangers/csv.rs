@@ -21,7 +21,7 @@ use Outcome::{Doubts, Reads, Refuses};
 fn attach(bytes: &[u8], name: &str, options: &[&str]) -> std::process::Output {
     let folder = tempfile::tempdir().unwrap();
     let scene = folder.path().join("scene.ron");
-    let made = run(&["new", "column", "--out", scene.to_str().unwrap()]);
+    let made = run(&["new", "column", scene.to_str().unwrap()]);
     assert!(made.status.success(), "{}", said(&made));
     let table = folder.path().join(name);
     fs::write(&table, bytes).unwrap();

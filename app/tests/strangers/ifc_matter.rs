@@ -68,9 +68,11 @@ impl Import {
     }
 }
 
-/// Doubts are those notes that a plain file does not have.
+/// Doubts are those notes that a plain file does not have. That members of a model without a
+/// foundation rest on nothing is no doubt about what they are made of.
 fn is_doubted(import: &Import) -> bool {
-    !import.report["notes"].as_array().unwrap().is_empty()
+    let notes = import.report["notes"].as_array().unwrap();
+    notes.iter().any(|note| !note.as_str().unwrap().contains("rests on nothing"))
 }
 
 /// File, what scene.ron or the list of materials says, whether there is a note.

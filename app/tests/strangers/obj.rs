@@ -219,6 +219,7 @@ fn relatives_of_the_folder() {
     let column = |name: &str, x: f64, first| block(name, [x, 0.0, 0.0], [0.4, 4.0, 0.4], first);
     let plain = column("o Column_1", 0.0, 1);
     let one: &[(&str, [f64; 4])] = &[("Column_1", COLUMN)];
+    // Its sections are 3, 2 and 1 m high: the middle one is said.
     let stair = [[0., 0.], [3., 0.], [3., 3.], [2., 3.], [2., 2.], [1., 2.], [1., 1.], [0., 1.]];
     // A window whose opening is reached by a bridge edge, and a comb of three teeth.
     let window = [
@@ -237,7 +238,7 @@ fn relatives_of_the_folder() {
         (
             "stair",
             prism("Wall_2", &stair, 0.3),
-            ("", &[], &[("Wall_2", [3., 0.3, 3., 1.8])], QUIET),
+            ("", &[], &[("Wall_2", [3., 0.3, 2., 1.8])], QUIET),
         ),
         (
             "window",

@@ -13,8 +13,9 @@ use super::{hostile, run, said};
 fn scene(folder: &Path) -> PathBuf {
     let column = "Column(section: Rectangle(width_m: 0.4, depth_m: 0.4), height_m: 3)";
     let text = format!(
-        "(schema: \"intrados.scene/1\", members: [(id: \"C\", body: {column}, \
-         at: (1.7, 0, 1.3), concrete: \"C30/37\")])"
+        "(schema: \"intrados.scene/1\", materials: [(name: \"grey\", colour: (0.4, 0.4, 0.4))], \
+         members: [(id: \"C\", body: {column}, at: (1.7, 0, 1.3), concrete: \"C30/37\", \
+         material: \"grey\")])"
     );
     let place = folder.join("s.ron");
     fs::write(&place, text).unwrap();
@@ -241,5 +242,6 @@ fn options_without_a_scene_are_refused_and_corners_name_their_faces() {
     let report: Value = serde_json::from_slice(&done.stdout).unwrap();
     let faces = report["faces"].as_array().unwrap();
     assert_eq!(faces.len(), 8);
-    assert!(faces.iter().all(|at| at.as_array().unwrap().len() == 2), "{report}");
+    // Two faces meet there, at one end.
+    assert!(faces.iter().all(|at| at.as_array().unwrap().len() == 3), "{report}");
 }

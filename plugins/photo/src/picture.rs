@@ -124,7 +124,8 @@ impl Photograph {
         let mut bytes = Vec::new();
         file.read_to_end(&mut bytes)?;
         let mut picture = decode(&bytes)?;
-        let mut doubts: Vec<String> = damage(&bytes).into_iter().collect();
+        let doubt = damage(&bytes).or_else(|| filled(&bytes, &picture));
+        let mut doubts: Vec<String> = doubt.into_iter().collect();
         drop(bytes);
         if let Some(orientation) = orientation.and_then(Orientation::from_exif) {
             picture.apply_orientation(orientation);
@@ -267,6 +268,37 @@ fn damage(bytes: &[u8]) -> Option<String> {
     Some(format!(
         "its JPEG data are damaged ({why}): a part of it may be filled in grey; copy it again"
     ))
+}
+
+/// Rows of one colour at the foot of a JPEG, and equal bytes in a row, from which on it is doubted.
+const FILLED_ROWS: usize = 32;
+const EQUAL_BYTES: usize = 4096;
+
+/// Whether a JPEG looks as if data were missing within it, which no decoder need notice: where they
+/// end early the rest is filled with the last colour, and a copy that broke off may have left zeros.
+fn filled(bytes: &[u8], picture: &DynamicImage) -> Option<String> {
+    decode::jpeg::markers(bytes)?;
+    let longest = bytes.chunk_by(|a, b| a == b).map(<[u8]>::len).max().unwrap_or_default();
+    if longest >= EQUAL_BYTES {
+        return Some(format!(
+            "its JPEG data are damaged (the same byte {longest} times in a row): a part of it may not be what was seen; copy it again"
+        ));
+    }
+    let (data, width, channels) = match picture {
+        DynamicImage::ImageRgb8(p) => (p.as_raw(), p.width() as usize, 3),
+        DynamicImage::ImageLuma8(p) => (p.as_raw(), p.width() as usize, 1),
+        _ => return None,
+    };
+    let last = data.rchunks_exact(channels).next()?;
+    let is_filled = |row: &&[u8]| row.chunks_exact(channels).all(|pixel| pixel == last);
+    let row = (width * channels).max(1);
+    let rows = data.rchunks_exact(row).take_while(is_filled).count();
+    let height = data.len() / row;
+    (rows >= FILLED_ROWS && rows < height).then(|| {
+        format!(
+            "its JPEG data are damaged, or it has a border: its lowest {rows} rows are of one colour; copy it again"
+        )
+    })
 }
 
 fn cmyk() -> PictureError {

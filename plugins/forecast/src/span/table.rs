@@ -377,6 +377,9 @@ fn year(what: &str, text: &str, id: &str, doubts: &mut Doubts) -> Result<Option<
 /// Lengths of spans: of `(1)=12;` the number after the sign, of `12` itself; a total is left out.
 fn spans(text: &str, mark: DecimalMark) -> Result<Vec<f64>, String> {
     let mut spans = Vec::new();
+    // Where semicolons part the spans, a comma is of decimals.
+    let is_comma = text.contains(';') && text.contains(',') && !text.contains('.');
+    let mark = if is_comma { DecimalMark::Comma } else { mark };
     for part in text.split([';', ' ']).map(str::trim) {
         let (key, value) = part.split_once('=').unwrap_or(("", part));
         if part.is_empty() || key.eq_ignore_ascii_case("total") {
@@ -411,6 +414,10 @@ mod tests {
                     1,Over  the creek,43.1,-80.2,1965,Total=52 (1)=12;(2)=19;(3)=21;\n\
                     2,,,,,7.5\n\
                     2,,,,,8\n";
+        let decimals = |text: &str| spans(text, DecimalMark::Point).unwrap();
+        assert_eq!(decimals("12,5;19,0"), [12.5, 19.0]);
+        assert_eq!(decimals("12.5;19.25"), [12.5, 19.25]);
+        assert!(spans("12,19", DecimalMark::Point).is_err(), "one span or two");
         let bridges = parse(text.as_bytes()).unwrap().bridges;
         assert_eq!(bridges[0].spans, [12.0, 19.0, 21.0]);
         assert_eq!((bridges[0].place, bridges[0].year), (Some([43.1, -80.2]), Some(1965)));
