@@ -328,7 +328,7 @@ fn what_is_to_be_inspected_is_of_normal_priority() {
 #[test]
 fn a_defect_that_is_found_again_keeps_its_topic() {
     let again = r#"(
-            member: "2O2Fr$t4X7Zf8NOew3FLOH", name: "crack, later", date: "2027-05-02", along: 0.5, angle_deg: 90,
+            member: "2O2Fr$t4X7Zf8NOew3FLOH", name: "crack, later", date: "2027-05-02", confirmed: true, along: 0.5, angle_deg: 90,
             shows: Crack(width_mm: 0.6, course: Across),
         ),
     ],

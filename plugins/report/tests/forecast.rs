@@ -90,7 +90,7 @@ fn salt_without_numbers_is_assumed_with_its_spread() {
         read("members.csv").contains(",forecast,")
             && read("members.csv").contains("assumed by exposure class")
     );
-    let borne = ",worst zone,jack,2.5,0.25,diagonal tension,0.125,0.0625\r\n";
+    let borne = ",worst zone,jack,2.5,0.25,diagonal tension,0.125,0.0625,\r\n";
     assert!(read("members.csv").ends_with(borne), "{}", read("members.csv"));
     assert!(read("report.html").contains("bears 2.50 ± 0.25 times jack"));
     assert!(read("damage.vtu").contains("measured"));
