@@ -5,6 +5,9 @@
 const LEAST: f64 = 0.005;
 /// Gap between padding and what was measured, as a share of what was measured.
 const GAP: f32 = 0.1;
+/// Air is measured beside padding where the grey there lies so low, as a share of what was measured.
+/// Beside a border of zeros around a body without air it lies in the middle.
+const AIR: f32 = 0.35;
 
 /// Gives padding the grey of air: the median of what is darker than half way between the darkest and
 /// the brightest that was measured.
@@ -32,7 +35,7 @@ fn air(measured: &mut [f32]) -> Option<f32> {
 
 /// Gives padding that no header declares the grey of air. It is taken for padding if it is one value
 /// alone, fills three of the picture's corners and hangs together with them, lies beyond all else by
-/// a gap, and ends at something darker than half way to the brightest: air that was measured. A
+/// a gap, and ends at something dark: air that was measured. A
 /// border of zeros around a body without air is left as it is, since it may be air.
 pub fn without_padding(values: &mut [f32], width: usize) {
     if let Some(is_padding) = undeclared(values, width) {
@@ -69,7 +72,7 @@ fn undeclared(values: &[f32], width: usize) -> Option<Vec<bool>> {
         let half = rim.len() / 2;
         rim.select_nth_unstable_by(half, f32::total_cmp)
     })?;
-    (*middle < 0.5 * (low + high)).then_some(is_padding)
+    (*middle < low + AIR * (high - low)).then_some(is_padding)
 }
 
 /// Pixels of a value that hang together with one of the corners.
