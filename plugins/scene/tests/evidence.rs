@@ -254,7 +254,7 @@ fn tables_of_all_sorts_say_the_same() {
     for text in [
         "along,mV,face\n0.25,-310,Front\n0.75,-120.5,Back\n",
         "\u{feff}along;mV;face\r\n0,25;-310;front\r\n0,75;-120,5;back\r\n",
-        "along\tmv\tFACE\n0.25\t-310\tFRONT\n\n0,75\t\u{2212}120,5\tBack",
+        "along\tmv\tFACE\n0,25\t-310\tFRONT\n\n0,75\t\u{2212}120,5\tBack",
         "\n along , mV , face \n\n 0.25 , -310 , Front \n , , \n\"0.75\",-120.5,Back\n",
     ] {
         let all = table("date: \"2026-05-03\",", text).observations();
@@ -397,8 +397,8 @@ fn faults_of_tables_are_named_with_line_and_column() {
     for (fields, text, place, words) in [
         ("", b"" as &[u8], "t.csv", "is empty"),
         ("", b"mV\n", "t.csv", "no rows"),
-        ("", &utf16, "t.csv", "UTF-8"),
-        ("", b"mV\n\xb5\n", "t.csv", "UTF-8"),
+        ("", &utf16, "t.csv:2: column mV", "hardly a potential"),
+        ("", b"mV\n\xb5\n", "t.csv:2: column mV", "no number"),
         ("", b"PK\x03\x04\x00\x00", "t.csv", "UTF-8"),
         ("", b"along,mW\n0.1,-300\n", "t.csv:1", "did you mean mV?"),
         ("", b"along,cover\n0.1,30\n", "t.csv:1", "cover_mm"),
@@ -452,7 +452,7 @@ fn faults_of_tables_are_named_with_line_and_column() {
             "has its unit in its name",
         ),
         ("", b"along,mV\n0.1,-300\n\n\n0.2,abc\n", "t.csv:5: column mV", "is no number"),
-        ("", b"along;mV\n0,1;-1.300,5\n", "t.csv:2: column mV", "thousands"),
+        ("", b"along;mV\n0.1;-300\n0,2;-310\n", "t.csv: column along", "all in one way"),
         ("", b"along,mV\n0,1,-300,5\n", "t.csv:2", "decimal comma"),
         ("", b"along,mV\n0.1,\n", "t.csv:2: column mV", "is empty"),
         ("", b"along,mV\n0.1,-300\n40,-300\n", "t.csv:3: column along", "share of the axis"),
@@ -461,7 +461,7 @@ fn faults_of_tables_are_named_with_line_and_column() {
         ("", b"mV,std_error\n-300,-1\n", "t.csv:2: column std_error", "above 0"),
         ("", b"mV,face\n-300,Upside\n", "t.csv:2: column face", "is no face"),
         ("", b"mV,face\n-300,Crown\n", "t.csv:2: column face", "Front, Right"),
-        ("", b"mV,date\n-300,3.5.2026\n", "t.csv:2: column date", "2026-05-03"),
+        ("", b"mV,date\n-300,3/5/2026\n", "t.csv", "date"),
         ("", b"depth_mm,chloride_percent_cement\n15,1\n5,2\n", "t.csv:2: column depth_mm", "rise"),
         ("unit: \"ue\",", b"gauge,value\nSG7,5\n", "t.csv:2: column gauge", "did you mean SG1?"),
         ("unit: \"ue\",", b"gauge,value\nLV1,5\n", "t.csv:2: column gauge", "in columns along"),
