@@ -254,7 +254,7 @@ fn tables_of_all_sorts_say_the_same() {
     for text in [
         "along,mV,face\n0.25,-310,Front\n0.75,-120.5,Back\n",
         "\u{feff}along;mV;face\r\n0,25;-310;front\r\n0,75;-120,5;back\r\n",
-        "along\tmv\tFACE\n0,25\t-310\tFRONT\n\n0,75\t\u{2212}120,5\tBack",
+        "along\tmv\tFACE\n0.25\t-310\tFRONT\n\n0,75\t\u{2212}120,5\tBack",
         "\n along , mV , face \n\n 0.25 , -310 , Front \n , , \n\"0.75\",-120.5,Back\n",
     ] {
         let all = table("date: \"2026-05-03\",", text).observations();
@@ -452,7 +452,12 @@ fn faults_of_tables_are_named_with_line_and_column() {
             "has its unit in its name",
         ),
         ("", b"along,mV\n0.1,-300\n\n\n0.2,abc\n", "t.csv:5: column mV", "is no number"),
-        ("", b"along;mV\n0.1;-300\n0,2;-310\n", "t.csv: column along", "all in one way"),
+        (
+            "",
+            b"along;mV\n0,1;-1.300\n0,2;-310,5\n0,3;-310.5\n",
+            "t.csv: column mV",
+            "all in one way",
+        ),
         ("", b"along,mV\n0,1,-300,5\n", "t.csv:2", "decimal comma"),
         ("", b"along,mV\n0.1,\n", "t.csv:2: column mV", "is empty"),
         ("", b"along,mV\n0.1,-300\n40,-300\n", "t.csv:3: column along", "share of the axis"),

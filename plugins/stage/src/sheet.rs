@@ -225,6 +225,17 @@ impl NumberStyle {
     }
 }
 
+/// The decimal mark that a cell has by itself; a point where it has none.
+#[must_use]
+pub fn own_mark(cell: &str) -> DecimalMark {
+    let mut style = NumberStyle::default();
+    style.learn(cell);
+    match style.verdict(style) {
+        StyleVerdict::Certain(mark) => mark,
+        StyleVerdict::Open | StyleVerdict::Mixed => DecimalMark::Point,
+    }
+}
+
 fn at((place, mark): (usize, &str)) -> (usize, char) {
     (place, if mark == "." { '.' } else { ',' })
 }

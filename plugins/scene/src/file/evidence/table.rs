@@ -402,8 +402,8 @@ struct Table<'a> {
     columns: Vec<Option<Column>>,
     /// What makes the numbers of each those of its column.
     scales: Vec<[f64; 2]>,
-    /// Decimal marks of each.
-    marks: Vec<DecimalMark>,
+    /// Decimal marks of each; `None` where each cell says its own.
+    marks: Vec<Option<DecimalMark>>,
     /// Names of columns that say nothing to us.
     strange: Vec<String>,
     /// Columns that hold what a gauge, or a place across, showed.
@@ -812,7 +812,11 @@ impl<'a> Table<'a> {
                 true => records.iter().filter_map(|(_, cells)| cells.get(index)).collect(),
                 false => Vec::new(),
             };
-            let mark = self.mark(index, *style, all, &cells)?;
+            let is_by_cell = style.verdict(all) == StyleVerdict::Mixed && !style.is_open();
+            let mark = match is_by_cell {
+                true => None,
+                false => Some(self.mark(index, *style, all, &cells)?),
+            };
             self.marks.push(mark);
         }
         Ok(())
@@ -831,7 +835,7 @@ impl<'a> Table<'a> {
         let mark = match style.verdict(all) {
             StyleVerdict::Certain(mark) => mark,
             StyleVerdict::Mixed => {
-                let message = "has decimal points and decimal commas: write all in one way";
+                let message = "has decimal points and decimal commas, and numbers that either may part: write all in one way";
                 return Err(Problem::error(place, "NO_NUMBER", message));
             }
             StyleVerdict::Open if !style.is_open() => return Ok(DecimalMark::Point),
@@ -1257,7 +1261,8 @@ impl Row<'_> {
 
     /// A cell's number as it is written.
     fn parse(&self, index: usize, cell: &str, column: Column) -> Result<f64, Problem> {
-        let mark = self.table.marks.get(index).copied().unwrap_or(DecimalMark::Point);
+        let known = self.table.marks.get(index).copied().flatten();
+        let mark = known.unwrap_or_else(|| sheet::own_mark(cell));
         sheet::number(cell, mark).map(|number| number.value).ok_or_else(|| {
             let hint = if cell.contains(',') {
                 ": write decimals with a point, and no separator of thousands"
