@@ -6,6 +6,9 @@
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 mod campaign;
+#[path = "../common/mod.rs"]
+#[expect(dead_code, reason = "paths are of other shapes here")]
+mod common;
 mod csv;
 mod decoders;
 mod gltf;
@@ -19,24 +22,12 @@ mod sino;
 
 use std::{
     path::{Path, PathBuf},
-    process::{Command, Output},
+    process::Output,
 };
 
-/// The program, where there is no screen.
-fn program() -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_intrados"));
-    command.env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY").env_remove("RUST_LOG");
-    command
-}
-
-/// Runs the program to its end.
-#[allow(dead_code, reason = "modules come one by one")]
-fn run(args: &[&str]) -> Output {
-    program().args(args).output().unwrap()
-}
+use common::{program, run};
 
 /// A file or folder of `INTRADOS_DATA/hostile`.
-#[allow(dead_code, reason = "modules come one by one")]
 fn hostile(name: &str) -> PathBuf {
     let data =
         std::env::var_os("INTRADOS_DATA").expect("INTRADOS_DATA must name the folder of test data");
@@ -44,7 +35,6 @@ fn hostile(name: &str) -> PathBuf {
 }
 
 /// What it says on standard error and whether it succeeded, for messages of failing tests.
-#[allow(dead_code, reason = "modules come one by one")]
 fn said(output: &Output) -> String {
     format!("{} {}", output.status, String::from_utf8_lossy(&output.stderr))
 }

@@ -126,14 +126,13 @@ fn cut_and_unfinished_photographs_are_refused_or_read_with_data() {
             assert!(said(&done).contains("is cut short"), "{}", said(&done));
         }
     }
-    // A part is missing within, and one that a copy left empty: the end is there.
+    // A copy that broke off has left zeros within, and the end is there. One that is cut and given an
+    // end again is not found out yet.
     let end = bytes.len() - 2;
-    // One that is cut and given an end again is not found out yet.
-    for middle in [[&bytes[..end / 2], &vec![0; end / 2]].concat()] {
-        fs::write(&copy, [&middle[..], &[0xff, 0xd9]].concat()).unwrap();
-        let done = read(&copy);
-        assert!(said(&done).contains("JPEG data are damaged"), "{}", said(&done));
-    }
+    let broken = [&bytes[..end / 2], &vec![0; end / 2], &[0xff, 0xd9]].concat();
+    fs::write(&copy, broken).unwrap();
+    let done = read(&copy);
+    assert!(said(&done).contains("JPEG data are damaged"), "{}", said(&done));
     // Its list of tags has no end.
     let newcomer = hostile("newcomer/newcomer_piexif.jpg");
     let picks = hostile("newcomer/newcomer_picks_4.csv");

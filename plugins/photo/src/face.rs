@@ -19,6 +19,8 @@ pub struct Surface {
     tracer: Tracer,
     start: DVec3,
     axis: DVec3,
+    /// Whether the member stands: its ends are a bottom and a top.
+    is_upright: bool,
     length: f64,
     zero: DVec3,
     ninety: DVec3,
@@ -82,9 +84,6 @@ pub(crate) struct Spot {
 /// Share of squared cosines between normals and radii from which a member is round: of a polygon of
 /// sixteen sides it is .987, of one of eight .95.
 const ROUND: f64 = 0.97;
-/// Cosine between the axis of what stands and the upright, beyond which its ends are a bottom and a
-/// top.
-const UPRIGHT: f64 = 0.7;
 /// Cosine between a flat face's normal and that of what belongs to it.
 const OWN: f64 = 0.7;
 
@@ -108,6 +107,7 @@ impl Surface {
             tracer,
             start: frame.start.as_dvec3(),
             axis,
+            is_upright: frame.is_upright(),
             length,
             zero: frame.zero.as_dvec3(),
             ninety: axis.cross(frame.zero.as_dvec3()),
@@ -127,7 +127,7 @@ impl Surface {
     /// The end of the member that a place is nearer to, as people call it.
     pub(crate) fn end_at(&self, place: DVec3) -> &'static str {
         let is_far = self.coordinates(place).0 > 0.5;
-        match (self.axis.y.abs() > UPRIGHT, is_far, is_far == (self.axis.y > 0.0)) {
+        match (self.is_upright, is_far, is_far == (self.axis.y > 0.0)) {
             (true, _, true) => "top",
             (true, _, false) => "bottom",
             (false, false, _) => "start",

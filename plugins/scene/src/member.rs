@@ -49,6 +49,9 @@ pub struct Frame {
     pub zero: Vec3,
 }
 
+/// Cosine between the axis of what stands and the vertical.
+const UPRIGHT: f32 = 0.7;
+
 impl Frame {
     /// The frame of a member of which only its kind and its box are known. Upright members have
     /// their axis up and their zero along +z; lying ones have it along the longer of x and z.
@@ -67,6 +70,12 @@ impl Frame {
             _ => (Vec3::Z * size.z, Vec3::X),
         };
         Self { start: middle - 0.5 * axis, axis, zero }
+    }
+
+    /// Whether it stands: its axis is nearer to the upright than 45°, about.
+    #[must_use]
+    pub fn is_upright(&self) -> bool {
+        self.axis.normalize_or_zero().y.abs() > UPRIGHT
     }
 
     /// Unit, towards 90 degrees.

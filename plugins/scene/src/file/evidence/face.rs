@@ -66,7 +66,7 @@ impl Sort {
     pub(crate) fn of(kind: MemberKind, frame: Frame) -> Self {
         match kind {
             MemberKind::Lining | MemberKind::Segment | MemberKind::Pipe => Self::Tunnel,
-            _ if frame.axis.normalize_or_zero().y.abs() > UPRIGHT => Self::Upright,
+            _ if frame.is_upright() => Self::Upright,
             _ => Self::Lying,
         }
     }
@@ -88,9 +88,6 @@ impl Sort {
         }
     }
 }
-
-/// Cosine between the axis of what stands and the vertical.
-pub(super) const UPRIGHT: f32 = 0.7;
 
 impl Face {
     /// All of them.

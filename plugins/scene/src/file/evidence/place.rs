@@ -7,7 +7,6 @@ use std::{
 
 use super::{
     Along, Evidence, Face, Finding, Photo, Placed, RawReading, Record,
-    face::UPRIGHT,
     table::{MOST_STRAIN, Seat, doubt_covers, doubt_profile},
 };
 use crate::{
@@ -494,8 +493,7 @@ impl<'a> Placing<'a> {
         }
         // Of what stands, a height is a place on the axis, too.
         let rise = member.frame.axis.y;
-        let stands = rise.abs() > UPRIGHT * member.frame.axis.length();
-        let by_height = record.height_m.filter(|_| stands).map(|height| {
+        let by_height = record.height_m.filter(|_| member.frame.is_upright()).map(|height| {
             let y = member.bounds[0].y + height;
             ((y - member.frame.start.y) / rise).clamp(0.0, 1.0)
         });
