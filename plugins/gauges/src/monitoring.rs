@@ -132,10 +132,26 @@ pub fn name(series: &Series) -> String {
     format!("{} over the years{span} ({} readings)", series.gauge, series.samples.len())
 }
 
+/// Why a series says nothing, as far as the file tells; none where it may.
+#[must_use]
+pub fn refusal(scene: &Scene, series: &Series) -> Option<String> {
+    let gauge = scene.structure.gauges.iter().find(|g| g.name == series.gauge)?;
+    let is_strain = matches!(gauge.measures, intrados_scene::structure::Measures::Strain(_));
+    (!is_strain).then(|| {
+        "it measures no strain of its member: of displacement and stress a load test says more"
+            .into()
+    })
+}
+
 fn heard_of(scene: &Scene, series: &Series, forecast: &Forecast) -> Result<Drift, String> {
-    let course = forecast.gauges.iter().find(|c| c.gauge == series.gauge).ok_or(
-        "it measures no strain of its member: of displacement and stress a load test says more",
-    )?;
+    if let Some(why) = refusal(scene, series) {
+        return Err(why);
+    }
+    let course = forecast
+        .gauges
+        .iter()
+        .find(|c| c.gauge == series.gauge)
+        .ok_or("it lies on no part of its member that is computed")?;
     drift(series, course, forecast.age_years, scene.structure.today())
 }
 

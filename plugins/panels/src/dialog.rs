@@ -20,7 +20,7 @@ const TOO_SOON: Duration = Duration::from_millis(400);
 const PHOTOGRAPHS: &[&str] = &["jpg", "jpeg", "png", "tif", "tiff"];
 
 /// What slices and tables end in.
-const EVIDENCE: &[&str] = &["csv", "tsv", "txt", "tif", "tiff", "png", "mha", "dcm"];
+const EVIDENCE: &[&str] = &["csv", "tsv", "txt", "tif", "tiff", "png", "mha", "mhd", "dcm"];
 
 /// Whether a file is a photograph, by its name; those too that are refused with a remedy.
 pub(crate) fn is_photograph(path: &Path) -> bool {

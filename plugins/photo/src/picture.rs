@@ -270,12 +270,15 @@ fn damage(bytes: &[u8]) -> Option<String> {
     ))
 }
 
-/// Rows of one colour at the foot of a JPEG, and equal bytes in a row, from which on it is doubted.
+/// Rows at the foot of a JPEG that repeat themselves, and equal bytes in a row, from which on it is
+/// doubted; the longest that its blocks can be, so that rows repeat after it.
 const FILLED_ROWS: usize = 32;
 const EQUAL_BYTES: usize = 4096;
+const BLOCK: usize = 32;
 
 /// Whether a JPEG looks as if data were missing within it, which no decoder need notice: where they
-/// end early the rest is filled with the last colour, and a copy that broke off may have left zeros.
+/// end early each block is the code of nothing but zeros, the same one again and again (or the last
+/// colour), and a copy that broke off may have left zeros. No two blocks of a photograph are equal.
 fn filled(bytes: &[u8], picture: &DynamicImage) -> Option<String> {
     decode::jpeg::markers(bytes)?;
     let longest = bytes.chunk_by(|a, b| a == b).map(<[u8]>::len).max().unwrap_or_default();
@@ -289,14 +292,17 @@ fn filled(bytes: &[u8], picture: &DynamicImage) -> Option<String> {
         DynamicImage::ImageLuma8(p) => (p.as_raw(), p.width() as usize, 1),
         _ => return None,
     };
-    let last = data.rchunks_exact(channels).next()?;
-    let is_filled = |row: &&[u8]| row.chunks_exact(channels).all(|pixel| pixel == last);
-    let row = (width * channels).max(1);
-    let rows = data.rchunks_exact(row).take_while(is_filled).count();
-    let height = data.len() / row;
-    (rows >= FILLED_ROWS && rows < height).then(|| {
+    // At its ends a row is smoothed otherwise.
+    let inner = channels * BLOCK..channels * width.saturating_sub(BLOCK);
+    let is_repeated = |row: &&[u8]| {
+        let row = row.get(inner.clone()).unwrap_or_default();
+        let (first, next) = (row.iter(), row.iter().skip(channels * BLOCK));
+        row.len() > channels * BLOCK && first.zip(next).all(|(a, b)| a == b)
+    };
+    let rows = data.rchunks_exact((width * channels).max(1)).take_while(is_repeated).count();
+    (rows >= FILLED_ROWS && rows < picture.height() as usize).then(|| {
         format!(
-            "its JPEG data are damaged, or it has a border: its lowest {rows} rows are of one colour; copy it again"
+            "its JPEG data are damaged, or it has a border: its lowest {rows} rows repeat themselves; copy it again"
         )
     })
 }

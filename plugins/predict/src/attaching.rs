@@ -7,6 +7,7 @@ use std::{
 };
 
 use intrados_ct::{Picture, Slice, Slices, source::SliceSource};
+use intrados_gauges::monitoring;
 use intrados_scene::{
     Scene,
     attach::{Attachment, Cut, Proposal, What},
@@ -50,21 +51,20 @@ pub fn examine(
 /// Which of the readings that are attached no prediction uses, and why: one line for each reason.
 fn unused_readings(proposal: &Proposal<'_>) -> Vec<String> {
     let scene = &proposal.scene;
-    let added: HashSet<&str> = proposal
-        .added
-        .iter()
-        .filter(|one| one.kind == "gauge")
-        .map(|one| one.name.as_str())
-        .collect();
-    let mut lines: Vec<String> = Vec::new();
+    let is_added = |kind: &str, gauge: &str| {
+        proposal.added.iter().any(|one| one.kind == kind && one.name == gauge)
+    };
+    let structure = &scene.structure;
+    let readings = structure.readings.iter().filter(|r| is_added("gauge", &r.of));
+    let readings = readings.filter_map(|r| Some((&r.of, intrados_gauges::refusal(scene, r)?)));
+    let series = structure.series.iter().filter(|s| is_added("monitoring", &s.gauge));
+    let series = series.filter_map(|s| Some((&s.gauge, monitoring::refusal(scene, s)?)));
     let mut reasons: HashSet<String> = HashSet::new();
-    for reading in scene.structure.readings.iter().filter(|r| added.contains(r.of.as_str())) {
-        let Some(why) = intrados_gauges::refusal(scene, reading) else { continue };
-        if reasons.insert(why.clone()) {
-            lines.push(format!("gauge {}: not used, because {why}", reading.of));
-        }
-    }
-    lines
+    readings
+        .chain(series)
+        .filter(|(_, why)| reasons.insert(why.clone()))
+        .map(|(gauge, why)| format!("gauge {gauge}: not used, because {why}"))
+        .collect()
 }
 
 /// Refuses what a report cannot show as a photograph of a finding.

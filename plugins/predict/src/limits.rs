@@ -166,10 +166,6 @@ pub(crate) fn limits(
         );
     }
     limits.splice(0..0, limits_of_states(members));
-    limits.splice(0..0, to_check.iter().map(|line| format!("Check an assumption: {line}.")));
-    let failing = members.iter().filter_map(|m| Some((m, m.failure.as_ref()?)));
-    let failing = failing.map(|(m, end)| format!("{}: {}", m.name, end.sentence()));
-    limits.splice(0..0, failing.collect::<Vec<_>>());
     let assumed_steel =
         |m: &&MemberPrediction| scene.structure.assembly_of(&m.id).is_some_and(|a| a.steel_assumed);
     let assumed = [

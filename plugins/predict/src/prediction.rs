@@ -52,6 +52,9 @@ pub struct Prediction {
     pub items: Vec<ledger::Item>,
     /// Those of the items that were not used, in few words.
     pub silences: Vec<MissingEvidence>,
+    /// What is doubted of the files that were read, or was assumed where they say nothing.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub doubts: Vec<String>,
     /// What the prediction does not say.
     pub limits: Vec<String>,
 }

@@ -119,6 +119,8 @@ pub struct Shown {
     pub pictures: Vec<Option<Picture>>,
     /// How much of each face is seen, also of those that are not.
     pub faces: Vec<FaceSeen>,
+    /// What speaks against the photographs themselves, each with its name.
+    pub doubts: Vec<String>,
 }
 
 /// How much of a face photographs show.
@@ -179,6 +181,7 @@ impl Shown {
     pub fn extend(&mut self, more: Self) {
         self.observations.extend(more.observations);
         self.pictures.extend(more.pictures);
+        self.doubts.extend(more.doubts);
         // Two photographs of a face may show the same of it: it counts what the better one shows.
         for face in more.faces {
             match self.faces.iter_mut().find(|known| known.face == face.face) {
@@ -203,7 +206,8 @@ impl Shown {
 pub fn observed(scene: &Scene, photo: &Photographed, job: &Job) -> Result<Shown, PhotoError> {
     let (photograph, site, located) = placed(scene, photo, job)?;
     let (surface, faces) = faces(scene, photo, &site, (&photograph, &located), job)?;
-    Ok(observations(photo, surface, &faces))
+    let doubts = photograph.doubts.iter().map(|doubt| format!("{}: {doubt}", name(photo)));
+    Ok(Shown { doubts: doubts.collect(), ..observations(photo, surface, &faces) })
 }
 
 /// The faces of its member that a placed photograph shows, without the light on them, read.
@@ -302,7 +306,7 @@ fn observations(photo: &Photographed, surface: &Surface, faces: &[ReadFace]) -> 
     }
     pictures.resize(found.len(), None);
     let faces = surface.faces.iter().map(|face| seen_of(face, faces)).collect();
-    Shown { observations: found, pictures, faces }
+    Shown { observations: found, pictures, faces, doubts: Vec::new() }
 }
 
 fn seen_of(face: &Face, read: &[ReadFace]) -> FaceSeen {

@@ -119,10 +119,11 @@ macro_rules! attacks {
 
 attacks!(scene, model, properties, mesh, picture, slices, volume, evidence, table, profile, cracks);
 attacks!(deck, gmsh, groups);
+attacks!(photograph, dicom, sinogram, picks, colmap, spans, guide);
 
 #[test]
 fn every_reader_is_attacked() {
-    assert_eq!(READERS.len(), 14);
+    assert_eq!(READERS.len(), 21);
     for reader in &READERS {
         assert!(!(reader.corpus)().is_empty(), "{}", reader.name);
     }

@@ -94,6 +94,7 @@ pub(crate) fn damage(seed: &[u8], dice: &mut Dice) -> Vec<u8> {
         bytes = match split(&bytes) {
             Some((json, rest)) if dice.below(8) > 0 => joined(&text(json, dice), rest),
             _ if dice.below(3) > 0 && std::str::from_utf8(&bytes).is_ok() => text(&bytes, dice),
+            _ if dice.below(2) > 0 && !lengths(&bytes).is_empty() => structured(bytes, dice),
             _ => binary(bytes, dice),
         };
     }
@@ -162,6 +163,74 @@ fn repeated(bytes: &[u8], dice: &mut Dice) -> Vec<u8> {
     let from = dice.below(bytes.len());
     let piece = &bytes[from..(from + 1 + dice.below(12)).min(bytes.len())];
     [&bytes[..from], &piece.repeat(1 << dice.below(13)), &bytes[from..]].concat()
+}
+
+/// Where lengths, sizes and counts lie, and how many bytes each takes: in the segments of a JPEG, the
+/// chunks of a PNG, the entries of a TIFF (or of EXIF within a JPEG), and the elements of a DICOM
+/// file.
+fn lengths(bytes: &[u8]) -> Vec<(usize, usize)> {
+    let at = |i: usize, n: usize| bytes.get(i..i + n);
+    let mut found = Vec::new();
+    if bytes.starts_with(&[0xff, 0xd8]) {
+        let mut i = 2;
+        while let Some([0xff, code, high, low]) = at(i, 4).and_then(|b| b.as_array::<4>()) {
+            found.push((i + 2, 2));
+            // Sizes in a frame's header.
+            if (0xc0..=0xc3).contains(code) {
+                found.extend([(i + 5, 2), (i + 7, 2), (i + 9, 1)]);
+            }
+            i += 2 + (usize::from(*high) << 8 | usize::from(*low)).max(2);
+        }
+    } else if bytes.starts_with(b"\x89PNG") {
+        let mut i = 8;
+        while let Some(length) = at(i, 4).and_then(|b| b.as_array::<4>()) {
+            found.extend([(i, 4), (i + 8, 4), (i + 12, 4), (i + 16, 1), (i + 17, 1)]);
+            i = i.saturating_add(12 + u32::from_be_bytes(*length) as usize);
+        }
+    }
+    let directory = bytes.windows(4).position(|w| w == b"II*\0");
+    if let Some(base) = directory {
+        let first = at(base + 4, 4).and_then(|b| b.as_array::<4>()).map(|b| u32::from_le_bytes(*b));
+        let list = base.saturating_add(first.unwrap_or(0) as usize);
+        found.extend([(base + 4, 4), (list, 2)]);
+        let count = at(list, 2).map_or(0, |b| usize::from(b[0]) | usize::from(b[1]) << 8);
+        for entry in (0..count.min(64)).map(|k| list + 2 + 12 * k) {
+            found.extend([(entry, 2), (entry + 2, 2), (entry + 4, 4), (entry + 8, 4)]);
+        }
+    }
+    if at(128, 4) == Some(b"DICM") {
+        let kinds: [&[u8]; 6] = [b"OB", b"OW", b"SQ", b"UN", b"US", b"DS"];
+        for i in (132..bytes.len().saturating_sub(8)).step_by(2) {
+            match at(i, 2) {
+                Some(kind) if kinds[..4].contains(&kind) => found.push((i + 4, 4)),
+                Some(kind) if kinds[4..].contains(&kind) => {
+                    found.extend([(i + 2, 2), (i + 4, 2)]);
+                }
+                Some([0xfe, 0xff]) => found.push((i + 4, 4)),
+                _ => {}
+            }
+        }
+    }
+    found.retain(|(i, n)| i + n <= bytes.len());
+    found
+}
+
+/// A length, a size or a count that lies: at its limits, doubled, halved, one more or less.
+fn structured(mut bytes: Vec<u8>, dice: &mut Dice) -> Vec<u8> {
+    let places = lengths(&bytes);
+    let (at, n) = places[dice.below(places.len())];
+    let field = &mut bytes[at..at + n];
+    match dice.below(4) {
+        0 => field.fill([0, 0xff, 0x7f, 1][dice.below(4)]),
+        1 => field.copy_from_slice(&QUADS[dice.below(QUADS.len())][..n]),
+        2 => field.rotate_left(1 % n),
+        _ => {
+            let byte = &mut field[dice.below(n)];
+            *byte =
+                [byte.wrapping_add(1), byte.wrapping_sub(1), *byte << 1, *byte >> 1][dice.below(4)];
+        }
+    }
+    bytes
 }
 
 fn binary(mut bytes: Vec<u8>, dice: &mut Dice) -> Vec<u8> {

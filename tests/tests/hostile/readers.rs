@@ -39,7 +39,7 @@ pub(crate) struct Reader {
     pub(crate) cases: u64,
 }
 
-pub(crate) const READERS: [Reader; 14] = [
+pub(crate) const READERS: [Reader; 21] = [
     Reader { name: "scene", extension: "ron", reads: scene, corpus: scenes, cases: 300 },
     Reader { name: "model", extension: "glb", reads: model, corpus: models, cases: 300 },
     Reader {
@@ -71,6 +71,19 @@ pub(crate) const READERS: [Reader; 14] = [
         corpus: meshes_of_gmsh,
         cases: 400,
     },
+    Reader {
+        name: "photograph",
+        extension: "jpg",
+        reads: photograph,
+        corpus: photographs,
+        cases: 300,
+    },
+    Reader { name: "dicom", extension: "dcm", reads: volume, corpus: dicoms, cases: 400 },
+    Reader { name: "sinogram", extension: "tif", reads: sinogram, corpus: sinograms, cases: 200 },
+    Reader { name: "picks", extension: "csv", reads: picks, corpus: lists_of_picks, cases: 300 },
+    Reader { name: "colmap", extension: "txt", reads: colmap, corpus: lists_of_poses, cases: 300 },
+    Reader { name: "spans", extension: "csv", reads: spans, corpus: lists_of_spans, cases: 300 },
+    Reader { name: "guide", extension: "guide", reads: guide, corpus: guides, cases: 100 },
     Reader {
         name: "groups",
         extension: "groups.ron",
@@ -612,4 +625,234 @@ fn meshes_of_gmsh() -> Vec<Vec<u8>> {
         "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n{groups}$Nodes\n8\n{numbered}$EndNodes\n$Elements\n2\n1 3 2 3 1 1 4 8 5\n2 5 2 1 1 1 2 3 4 5 6 7 8\n$EndElements\n"
     );
     vec![new.into_bytes(), old.into_bytes()]
+}
+
+/// Segments of a JPEG, EXIF with all kinds of tags, and without the end of its list.
+fn photographs() -> Vec<Vec<u8>> {
+    let colours =
+        image::RgbImage::from_fn(40, 30, |x, y| image::Rgb([x as u8 * 6, y as u8 * 8, 99]));
+    let plain = written("p.jpg", |path| colours.save(path).unwrap());
+    let with = |exif: &[u8]| {
+        let length = (exif.len() as u16 + 8).to_be_bytes();
+        [&plain[..2], &[0xff, 0xe1], &length, b"Exif\0\0", exif, &plain[2..]].concat()
+    };
+    let entry = |tag: u16, kind: u16, count: u32, value: u32| {
+        [&tag.to_le_bytes()[..], &kind.to_le_bytes(), &count.to_le_bytes(), &value.to_le_bytes()]
+            .concat()
+    };
+    let head = [&b"II*\0"[..], &8_u32.to_le_bytes(), &2_u16.to_le_bytes()].concat();
+    let own = [entry(0x112, 3, 1, 6), entry(0x8769, 4, 1, 38)].concat();
+    let sub = [
+        5_u16.to_le_bytes().to_vec(),
+        entry(0x920a, 5, 1, 104),
+        entry(0xa002, 4, 1, 40),
+        entry(0xa003, 4, 1, 30),
+        entry(0xa405, 3, 1, 28),
+        entry(0x9000, 7, 4, 0x3132_3330),
+    ]
+    .concat();
+    let exif = [&head[..], &own, &[0; 4], &sub, &[0; 4], &[50, 0, 0, 0, 10, 0, 0, 0]].concat();
+    let tiff = written("p.tif", |path| colours.save(path).unwrap());
+    let png = written("p.png", |path| colours.save(path).unwrap());
+    vec![
+        plain.clone(),
+        with(&exif),
+        with(&exif[..36]),
+        plain[..plain.len() / 2].to_vec(),
+        tiff,
+        png,
+    ]
+}
+
+fn photograph(path: &Path) {
+    if let Ok(photograph) = intrados_photo::Photograph::open(path) {
+        let _ = photograph.taken.focal(photograph.size);
+    }
+    let _ = intrados_ct::picture::Picture::read(path, 64);
+}
+
+/// Explicit and implicit elements, packed and plain pixels, nested groups.
+fn dicoms() -> Vec<Vec<u8>> {
+    let file = |syntax: &str, elements: &[Vec<u8>]| {
+        let mut name = syntax.as_bytes().to_vec();
+        name.resize(name.len().next_multiple_of(2), 0);
+        let facts =
+            [&[2, 0, 0x10, 0][..], b"UI", &(name.len() as u16).to_le_bytes(), &name].concat();
+        let length = (facts.len() as u32).to_le_bytes();
+        [&[0; 128][..], b"DICM", &[2, 0, 0, 0], b"UL", &[4, 0], &length, &facts, &elements.concat()]
+            .concat()
+    };
+    let tag = |group: u16, element: u16| [group.to_le_bytes(), element.to_le_bytes()].concat();
+    let short = |g: u16, e: u16, kind: &str, value: &[u8]| {
+        [&tag(g, e)[..], kind.as_bytes(), &(value.len() as u16).to_le_bytes(), value].concat()
+    };
+    let long = |g: u16, e: u16, kind: &str, length: Option<u32>, value: &[u8]| {
+        let length = length.unwrap_or(value.len() as u32).to_le_bytes();
+        [&tag(g, e)[..], kind.as_bytes(), &[0, 0], &length, value].concat()
+    };
+    let item = |value: &[u8]| {
+        [&tag(0xfffe, 0xe000)[..], &(value.len() as u32).to_le_bytes(), value].concat()
+    };
+    let us = |g, e, n: u16| short(g, e, "US", &n.to_le_bytes());
+    let head = |bits: u16| {
+        vec![
+            short(8, 0x60, "CS", b"CT"),
+            short(0x20, 0x13, "IS", b"1 "),
+            short(0x20, 0x32, "DS", b"0\\0\\1.5 "),
+            us(0x28, 2, 1),
+            short(0x28, 4, "CS", b"MONOCHROME2 "),
+            us(0x28, 0x10, 8),
+            us(0x28, 0x11, 8),
+            short(0x28, 0x30, "DS", b"0.3\\0.3 "),
+            us(0x28, 0x100, bits),
+            us(0x28, 0x101, bits),
+            us(0x28, 0x102, bits - 1),
+            us(0x28, 0x103, 1),
+            short(0x28, 0x120, "SS", &(-2000_i16).to_le_bytes()),
+            short(0x28, 0x1052, "DS", b"-1024 "),
+        ]
+    };
+    let with =
+        |syntax: &str, bits: u16, last: Vec<u8>| file(syntax, &[&head(bits)[..], &[last]].concat());
+    let plain = long(0x7fe0, 0x10, "OW", None, &[7; 128]);
+    let packed = |frame: &[u8]| {
+        let end = [&tag(0xfffe, 0xe0dd)[..], &[0; 4]].concat();
+        let all = [item(&[]), item(frame), end].concat();
+        long(0x7fe0, 0x10, "OB", Some(u32::MAX), &all)
+    };
+    let mut runs = [2_u32, 64, 68].iter().flat_map(|n| n.to_le_bytes()).collect::<Vec<_>>();
+    runs.resize(64, 0);
+    runs.extend([0xc1, 5, 0, 0, 0xc1, 9, 0, 0]);
+    let jpeg = written("g.jpg", |path| {
+        image::GrayImage::from_fn(8, 8, |x, y| image::Luma([(x * y) as u8])).save(path).unwrap();
+    });
+    let spacing = short(0x28, 0x30, "DS", b"0.3\\0.3 ");
+    let measures = long(0x28, 0x9110, "SQ", None, &item(&spacing));
+    let shared = long(0x5200, 0x9229, "SQ", None, &item(&measures));
+    let enhanced =
+        [shared, us(0x28, 0x10, 8), us(0x28, 0x11, 4), short(0x28, 8, "IS", b"2 "), plain.clone()];
+    vec![
+        with("1.2.840.10008.1.2.1", 16, plain),
+        with("1.2.840.10008.1.2.5", 16, packed(&runs)),
+        with("1.2.840.10008.1.2.4.50", 8, packed(&jpeg)),
+        file("1.2.840.10008.1.2.1", &enhanced),
+    ]
+}
+
+fn sinograms() -> Vec<Vec<u8>> {
+    vec![
+        stack("s.tif", Depth::Float, [16, 12, 1]),
+        stack("s.tif", Depth::Sixteen { low: 0.0, high: 100.0 }, [16, 4, 9]),
+    ]
+}
+
+/// A sinogram to what speaks against it and its slices.
+fn sinogram(path: &Path) {
+    use intrados_xray::{
+        correct::{mend_dead_bins, no_integrals, sinogram_doubts},
+        recon::{Window, fbp},
+        volume::{Beam, Orbit, Sinogram},
+    };
+    let Ok(mut reader) = Volumes::open(path, Some([1e-4; 3])) else { return };
+    let [bins, rows, pages] = reader.grid().size;
+    if bins * rows * pages > 100_000 {
+        return;
+    }
+    for by_row in [true, false] {
+        let (views, rows) = if by_row { (rows, pages) } else { (pages, rows) };
+        let orbit =
+            Orbit::circle(Beam::Parallel, views, std::f64::consts::PI, [rows, bins], [1e-4; 2]);
+        let job = Job::default();
+        let Ok(mut read) = Sinogram::read(&mut reader, &orbit, by_row, 0..rows, &job) else {
+            continue;
+        };
+        let _ = (no_integrals(&read), mend_dead_bins(&mut read), sinogram_doubts(&read, false));
+        let grid = Grid::centred([bins.min(32), bins.min(32), rows], [1e-4; 3]);
+        let _ = fbp(&read, &grid, Window::SheppLogan, &job);
+    }
+}
+
+fn lists_of_picks() -> Vec<Vec<u8>> {
+    [
+        "photo,u,v,x,y,z\na.jpg,819.5,1019.3,0.2,0,0.2\na.jpg,871.8,988.8,0.2,0,-0.2\n",
+        "\u{feff}u;v;member;corner\n819,5;1019,3;C1;1\n871,8;988,8;C1;2\n",
+        "tag\tsize_mm\tmember\tface\talong\tacross_mm\tturn_deg\n3\t120\tC1\tFront\t0.5\t10\t90\n",
+    ]
+    .map(|t| t.as_bytes().to_vec())
+    .into()
+}
+
+fn picks(path: &Path) {
+    static SITE: LazyLock<intrados_photo::Site> =
+        LazyLock::new(|| intrados_photo::Site::new(&COLUMN, &Job::default()).unwrap());
+    let _ = intrados_photo::picks::read(path, &COLUMN, &SITE);
+}
+
+fn lists_of_poses() -> Vec<Vec<u8>> {
+    let cameras = "# cameras\n1 SIMPLE_PINHOLE 1600 1200 1294.3 800 600\n2 OPENCV 80 60 90 90 40 30 0.1 -0.1 0 0\n";
+    let images = "# images\n1 0.0099 -0.9641 -0.0027 0.2652 -0.796 1.459 6.906 1 cam1/a.jpg\n1 2 -1\n2 0.03 -0.84 -0.02 0.54 0.5 1.3 6.4 2 b.jpg\n\n";
+    vec![format!("{cameras}%\n{images}").into_bytes()]
+}
+
+/// Both files of COLMAP, divided by a line.
+fn colmap(path: &Path) {
+    let text = String::from_utf8_lossy(&fs::read(path).unwrap()).into_owned();
+    let (cameras, images) = text.split_once("%\n").unwrap_or((&text, &text));
+    let folder = path.parent().unwrap();
+    fs::write(folder.join("cameras.txt"), cameras).unwrap();
+    fs::write(folder.join("images.txt"), images).unwrap();
+    if let Ok(series) = intrados_photo::series::Series::read(folder) {
+        let pick = |photo: &str, x: f64, place: glam::DVec3| intrados_photo::picks::PickedIn {
+            photo: Some(photo.into()),
+            pick: intrados_photo::Pick { pixel: [x, 500.0], place },
+        };
+        let places = [glam::DVec3::X, glam::DVec3::Y, glam::DVec3::Z];
+        let picks: Vec<_> = places
+            .iter()
+            .zip([400.0, 600.0, 700.0])
+            .flat_map(|(place, x)| [pick("a.jpg", x, *place), pick("b.jpg", x - 380.0, *place)])
+            .collect();
+        let _ = series.placed(&picks).map(|placed| placed.located("a.jpg", &[]));
+    }
+}
+
+fn lists_of_spans() -> Vec<Vec<u8>> {
+    let head = "id,name,lat,lon,year,material,system,spans_m,width_m,environment\n";
+    vec![
+        format!("{head}B1,Mill,52.1,11.6,1967,concrete,beam,12;15;12,9.5,XD3\n").into_bytes(),
+        format!("\u{feff}{}B2;Süd;51,2;7,1;1980;concrete;slab;10;8;XC4\n", head.replace(',', ";"))
+            .into_bytes(),
+    ]
+}
+
+fn spans(path: &Path) {
+    let Ok(bridges) = intrados_forecast::span::parse(&fs::read(path).unwrap()) else { return };
+    for bridge in bridges.bridges.iter().take(4) {
+        let _ = intrados_forecast::span::spans(bridge);
+    }
+}
+
+/// What steers the walks of a small scene, as text: every number in it can be exchanged.
+fn guided() -> (Arc<LitScene>, Vec<Sensor>) {
+    let scene = Arc::new(Scene::load_bundled("cornell", &Job::default()).unwrap());
+    let camera = Camera { width: 8, height: 6, ..scene.cameras[0].clone() };
+    let lit = Arc::new(LitScene::build(scene, &Job::default()).unwrap());
+    (lit, vec![Sensor::Camera(camera)])
+}
+
+fn guides() -> Vec<Vec<u8>> {
+    let (lit, sensors) = guided();
+    let little = Schedule { first: 256, rounds: 2 };
+    let rule = scene_rule(&lit.scene);
+    let guide = learn(&lit, &sensors, rule, 1, Steering::On, little, &Job::default()).unwrap();
+    vec![ron::to_string(&guide).unwrap().into_bytes()]
+}
+
+fn guide(path: &Path) {
+    static LIT: LazyLock<(Arc<LitScene>, Vec<Sensor>)> = LazyLock::new(guided);
+    let (lit, sensors) = &*LIT;
+    let text = fs::read_to_string(path).unwrap_or_default();
+    if let Ok(guide) = ron::from_str::<intrados_light::Guide>(&text) {
+        let _ = guide.back(lit, sensors);
+    }
 }

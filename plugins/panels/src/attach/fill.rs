@@ -27,7 +27,7 @@ impl Form {
             height_m: number(&tr!("height"), &self.height_m)?.filter(|_| is_finding),
             instrument: text(&self.instrument).filter(|_| !is_slices),
             picture: text(&self.picture).filter(|_| is_finding).map(PathBuf::from),
-            confirmed: false,
+            confirmed: self.confirmed && !is_slices,
             what,
         })
     }
@@ -138,6 +138,9 @@ mod tests {
             length_m: None,
         };
         assert_eq!((what.what, what.along), (What::Finding(crack), Some([0.4, 0.4])));
+        assert!(!what.confirmed);
+        form.confirmed = true;
+        assert!(form.attachment().unwrap().confirmed);
         form.begin("C1", vec!["gauges.csv".into()]);
         assert!(matches!(form.attachment().unwrap().what, What::Table { .. }));
         form.begin("C1", vec!["a.tif".into(), "b.tif".into()]);

@@ -110,6 +110,8 @@ pub(crate) struct Form {
     unit: String,
     kind: usize,
     test: String,
+    /// Whether somebody stands by values that are doubted.
+    confirmed: bool,
     /// The path of a file that is to be added.
     path: String,
 }
@@ -366,4 +368,10 @@ fn place(ui: &mut Ui, form: &mut Form) {
         field(ui, &tr!("height, m"), &mut form.height_m, &tr!("above its lowest point"));
     }
     field(ui, &tr!("Name"), &mut form.name, &tr!("one is made"));
+    if matches!(form.sort, Some(Sort::Finding | Sort::Table)) {
+        ui.label("");
+        ui.checkbox(&mut form.confirmed, tr!("Values that are doubted are right"))
+            .on_hover_text(tr!("Such as a potential above 0, or a cover of 3 mm that is no 3 cm"));
+        ui.end_row();
+    }
 }

@@ -455,6 +455,9 @@ fn aside(
 
 /// Where it was taken from.
 fn stand(ui: &mut Ui, shot: &Shot, actions: &mut Actions, viewpoint: &mut Viewpoint) {
+    for doubt in &shot.opened.photograph.doubts {
+        ui.label(format!("⚠ {}", term(doubt)));
+    }
     match &shot.located {
         None if shot.placing.is_some() => drop(ui.weak(tr!("placing…"))),
         None => {

@@ -766,6 +766,12 @@ impl Predictor {
                 self.settings.profile.by_strength,
             ),
             silences: items.iter().filter_map(silence).collect(),
+            doubts: scene
+                .warnings
+                .iter()
+                .chain(self.photographed.values().flat_map(|shown| &shown.doubts))
+                .cloned()
+                .collect(),
             items,
             members,
             profile: self.settings.profile.clone(),

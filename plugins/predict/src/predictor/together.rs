@@ -163,7 +163,8 @@ impl Predictor {
         for series in &scene.structure.series {
             let gauge = scene.structure.gauges.iter().find(|g| g.name == series.gauge);
             let id = gauge.map_or("", |g| g.member.as_str());
-            let own = self.unmonitored.get(&series.gauge).cloned();
+            let own = monitoring::refusal(scene, series)
+                .or_else(|| self.unmonitored.get(&series.gauge).cloned());
             let said = || match fate(of(id), MONITORING) {
                 Some((_, why)) => why.clone(),
                 None => Some("its member's life is not computed, which tells creep".into()),
