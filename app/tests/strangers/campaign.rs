@@ -57,6 +57,8 @@ fn tables_of_bridges_of_strangers_with_data() {
         ("latin1.csv", true, "Windows-1252"),
         ("nbi_latlon.csv", true, "degrees, minutes and seconds"),
         ("rehab_before.csv", true, "before the year of building"),
+        // It may well lie there.
+        ("swapped_latlon.csv", true, ""),
         ("twice_column.csv", false, "are for the same"),
         ("year_1900.csv", true, "know no year"),
         ("year_future.csv", true, "a year to come"),

@@ -17,21 +17,33 @@ enum Outcome {
 
 use Outcome::{Doubts, Reads, Refuses};
 
-/// Attaches a table to the bundled column, in a project of its own.
+/// Attaches a table to a new column, in a project of its own.
 fn attach(bytes: &[u8], name: &str, options: &[&str]) -> std::process::Output {
+    attach_to(["column", "C1"], bytes, name, options)
+}
+
+fn attach_to(
+    [kind, member]: [&str; 2],
+    bytes: &[u8],
+    name: &str,
+    options: &[&str],
+) -> std::process::Output {
     let folder = tempfile::tempdir().unwrap();
     let scene = folder.path().join("scene.ron");
-    let made = run(&["new", "column", scene.to_str().unwrap()]);
+    let made = run(&["new", kind, scene.to_str().unwrap()]);
     assert!(made.status.success(), "{}", said(&made));
     let table = folder.path().join(name);
     fs::write(&table, bytes).unwrap();
     let project = folder.path().to_str().unwrap();
-    let args = ["attach", project, "C1", table.to_str().unwrap()];
+    let args = ["attach", project, member, table.to_str().unwrap()];
     run(&[&args[..], options].concat())
 }
 
 fn holds(bytes: &[u8], name: &str, options: &[&str], outcome: &Outcome) {
-    let output = attach(bytes, name, options);
+    came_to(attach(bytes, name, options), bytes, name, outcome);
+}
+
+fn came_to(output: std::process::Output, bytes: &[u8], name: &str, outcome: &Outcome) {
     let (ok, table, line) = (
         output.status.success(),
         String::from_utf8_lossy(&output.stdout).into_owned(),
@@ -75,6 +87,8 @@ fn tables_as_they_are_written_are_read_doubted_or_refused() {
             "along,depth_mm,chloride_percent_cement\n0.5,.5,1.1\n0.5,1.5,.6\n0.5,2.5,.3\n",
             Doubts("in cm, 25 mm"),
         ),
+        ("-320,-310,-300\n-250,-240,-230\n", Refuses("such as height_m,0.25,0.50")),
+        ("height_m,mV\n0.45,-320\n", Reads("0.15  ")),
         ("height_m,0.25,0.50\n0.5,-320,-310\n1.0,-250,-240\n", Reads("-240")),
     ] {
         holds(text.as_bytes(), "table.csv", &[], &outcome);
@@ -162,5 +176,24 @@ fn tables_of_strangers_with_data() {
         let path = hostile(file);
         let name = Path::new(file).file_name().unwrap().to_str().unwrap();
         holds(&fs::read(&path).unwrap(), name, &[], &outcome);
+    }
+}
+
+/// What gauges and loggers write, on a beam.
+#[test]
+#[ignore = "with_data: reads INTRADOS_DATA/hostile"]
+fn gauges_of_strangers_with_data() {
+    for (file, outcome) in [
+        ("e_notation.csv", Reads("120 ± 2.4 µε")),
+        ("fahrenheit.csv", Doubts("in °F?")),
+        ("gauge_thousands_de.csv", Reads("1250 ± 25 µε")),
+        ("monitor_duplicate_times.csv", Doubts("line 4 repeats line 2")),
+        ("tz_midnight.csv", Reads("2 readings")),
+        // Oldest first, however they stand.
+        ("unsorted_dates.csv", Reads("2026-04-29")),
+    ] {
+        let bytes = fs::read(hostile("public/csv").join(file)).unwrap();
+        let output = attach_to(["beam", "B1"], &bytes, file, &[]);
+        came_to(output, &bytes, file, &outcome);
     }
 }

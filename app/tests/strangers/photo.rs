@@ -105,6 +105,24 @@ fn series_with_folders_are_placed_with_data() {
     assert!(text.contains("its own picks place it") || alone.is_empty(), "{text}");
 }
 
+/// COLMAP saw the pictures upright, the table was picked in them or in the raw ones.
+#[test]
+#[ignore = "with_data: reads INTRADOS_DATA/hostile"]
+fn series_picked_before_they_were_turned_are_doubted_with_data() {
+    let at = |name: &str| hostile("public/photo").join(name);
+    let folder = tempfile::tempdir().unwrap();
+    let copies = ["s6A.jpg", "s6B.jpg"].map(|name| folder.path().join(name));
+    copies.iter().for_each(|copy| drop(fs::copy(at("pose6.jpg"), copy).unwrap()));
+    let photos: Vec<&Path> = copies.iter().map(PathBuf::as_path).collect();
+    let series = at("series6");
+    let more = ["--series", series.to_str().unwrap()];
+    for (table, is_doubted) in [("picks_series6_up.csv", false), ("picks_series6_raw.csv", true)] {
+        let (places, text) = placed(&photos, &at(table), &more);
+        assert_eq!(places.len(), 2, "{text}");
+        assert_eq!(text.contains(ON_ITS_SIDE), is_doubted, "{text}");
+    }
+}
+
 #[test]
 #[ignore = "with_data: reads INTRADOS_DATA/hostile"]
 fn cut_and_unfinished_photographs_are_refused_or_read_with_data() {

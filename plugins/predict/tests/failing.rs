@@ -6,6 +6,7 @@
 use std::fs;
 
 use intrados_damage::Sources;
+use intrados_forecast::ForecastSettings;
 use intrados_predict::{PredictSettings, Prediction, predict};
 use intrados_scene::Scene;
 use intrados_stage::Job;
@@ -37,7 +38,10 @@ fn predicted(force_kn: f64, history: &str, evidence: &str) -> Prediction {
     fs::write(folder.path().join("evidence.ron"), evidence).unwrap();
     let job = Job::default();
     let scene = Scene::load(&folder.path().join("scene.ron"), &job).unwrap();
-    predict(&scene, PredictSettings::default(), &Sources::default(), &job).unwrap()
+    // Stubs that are pressed evenly: on any bricks.
+    let coarse = ForecastSettings { element_m: Some(0.1), ..ForecastSettings::default() };
+    let settings = PredictSettings { forecast: Some(coarse), ..PredictSettings::default() };
+    predict(&scene, settings, &Sources::default(), &job).unwrap()
 }
 
 /// From a load that is borne to one that is far beyond.

@@ -5,7 +5,7 @@
 use std::sync::Arc;
 
 use intrados_damage::evidence::Sources;
-use intrados_forecast::Forecast;
+use intrados_forecast::{Forecast, ForecastSettings};
 use intrados_predict::{PredictSettings, Predictor};
 use intrados_scene::{
     Scene,
@@ -52,7 +52,10 @@ fn lives(joints: &str) -> (Vec<Forecast>, Vec<String>) {
     Arc::make_mut(&mut scene.structure)
         .series
         .extend(SIDES.map(|side| Series { gauge: side.to_string(), samples: vec![sample] }));
-    let mut predictor = Predictor::new(&scene, PredictSettings::default(), &Sources::default());
+    // The mean of a section is in equilibrium with its load on any bricks.
+    let coarse = ForecastSettings { element_m: Some(0.2), ..ForecastSettings::default() };
+    let settings = PredictSettings { forecast: Some(coarse), ..PredictSettings::default() };
+    let mut predictor = Predictor::new(&scene, settings, &Sources::default());
     while predictor.advance(&scene, &job).unwrap() {}
     let limits = predictor.finish(&scene).limits;
     (predictor.known_lives().values().flatten().cloned().collect(), limits)

@@ -24,8 +24,10 @@ use std::{
 use intrados_stage::random::Key;
 use readers::{READERS, Reader};
 
-/// Memory of the whole test, bytes: a reader that asks for more ends it.
+/// Addresses of the whole test, bytes: a reader that asks for more ends it.
 const MEMORY: u64 = 8 << 30;
+/// Memory that it holds at most, bytes, with all readers that are attacked side by side.
+const RESIDENT: u64 = 1 << 30;
 /// Far beyond what the slowest input takes on a busy machine: it does not come back.
 const PATIENCE: Duration = Duration::from_secs(240);
 
@@ -111,6 +113,16 @@ fn attack(name: &str) {
         }
     }
     assert!(failures.is_empty(), "{}", failures.join("\n"));
+    if let Some(most) = resident() {
+        assert!(most < RESIDENT, "{name}: {most} bytes of memory at most");
+    }
+}
+
+/// The most memory that this process has held so far, bytes; none where nobody tells.
+fn resident() -> Option<u64> {
+    let status = fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    Some(1024 * line.trim().trim_end_matches("kB").trim().parse::<u64>().ok()?)
 }
 
 macro_rules! attacks {

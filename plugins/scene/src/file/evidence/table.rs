@@ -615,10 +615,16 @@ impl<'a> Table<'a> {
                     let near = |known: &&str| edit_distance(name, known) <= 1;
                     COLUMNS.iter().map(|(name, _)| *name).find(near)
                 });
+                let is_grid = !self.strange.is_empty()
+                    && self.strange.iter().all(|name| name.trim().parse::<f64>().is_ok());
                 match nearly {
                     Some(known) => {
                         format!("no column says what was measured{strange}: did you mean {known}?")
                     }
+                    // Somebody's grid of potentials, as some instruments write it.
+                    None if is_grid => format!(
+                        "no line names columns: a grid's first line says where its columns lie, such as height_m,0.25,0.50, and each row begins with its own height_m or along; of a list name {KINDS}"
+                    ),
                     None => format!("no column says what was measured{strange}: name {KINDS}"),
                 }
             } else {

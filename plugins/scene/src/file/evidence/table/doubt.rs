@@ -262,9 +262,13 @@ fn doubt_repeats(table: &Table, rows: &[Row]) -> Option<String> {
             example = example.or(Some((row.line, line)));
         }
     }
-    // Numbers without decimals are often alike at one place.
+    // Numbers without decimals are often alike at one place; nothing is read twice in one minute.
+    let has_time = |line: usize| {
+        let row = rows.iter().find(|row| row.line == line);
+        row.is_some_and(|row| row.cells.iter().any(|cell| cell.contains(':')))
+    };
     let often = 3 * count >= rows.len();
-    let (line, before) = example.filter(|_| often)?;
+    let (line, before) = example.filter(|(line, _)| often || has_time(*line))?;
     Some(format!(
         "line {line} repeats line {before} in every cell, {count} rows in all: each counts; take out what was measured once, or {CONFIRM}"
     ))
