@@ -112,7 +112,9 @@ fn series_picked_before_they_were_turned_are_doubted_with_data() {
     let at = |name: &str| hostile("public/photo").join(name);
     let folder = tempfile::tempdir().unwrap();
     let copies = ["s6A.jpg", "s6B.jpg"].map(|name| folder.path().join(name));
-    copies.iter().for_each(|copy| drop(fs::copy(at("pose6.jpg"), copy).unwrap()));
+    for copy in &copies {
+        fs::copy(at("pose6.jpg"), copy).unwrap();
+    }
     let photos: Vec<&Path> = copies.iter().map(PathBuf::as_path).collect();
     let series = at("series6");
     let more = ["--series", series.to_str().unwrap()];
