@@ -23,14 +23,18 @@ CIRCLES = {
 faults = []
 
 
+# Crates that lie beside `plugins/`.
+BESIDE_PLUGINS = ("app", "scenes", "tests")
+
+
 def table():
     """Names of our crates in the order of ARCHITECTURE's table."""
     rows = re.findall(r"^\| `(?:plugins/)?(\w[\w/-]*)` \|", (ROOT / "ARCHITECTURE.md").read_text(), re.M)
-    return [row for row in rows if (ROOT / "plugins" / row / "Cargo.toml").exists() or row in ("app", "tests")]
+    return [row for row in rows if (ROOT / "plugins" / row / "Cargo.toml").exists() or row in BESIDE_PLUGINS]
 
 
 def folder(crate):
-    return ROOT / crate if crate in ("app", "tests") else ROOT / "plugins" / crate
+    return ROOT / crate if crate in BESIDE_PLUGINS else ROOT / "plugins" / crate
 
 
 def name(crate):
