@@ -24,7 +24,7 @@ faults = []
 
 
 # Crates that lie beside `plugins/`.
-BESIDE_PLUGINS = ("app", "scenes", "tests")
+BESIDE_PLUGINS = ("app", "assets", "scenes", "tests")
 
 
 def table():
@@ -135,7 +135,7 @@ for dependency in shared:
     if not re.search(rf"^{dependency}(\.workspace| = {{ workspace)", manifests, re.M):
         faults.append(f"Cargo.toml: no crate takes {dependency}: take it out")
 
-for page in [*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("plugins/*/README.md"), *ROOT.glob("plugins/*/docs/*.md"), *ROOT.glob("plugins/*/assets/*.md")]:
+for page in [*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("plugins/*/README.md"), *ROOT.glob("plugins/*/docs/*.md"), *ROOT.glob("assets/*/*.md")]:
     for link in re.findall(r"\]\(([^)\s]+)\)", page.read_text()):
         target = link.split("#")[0]
         if target and ":" not in target and not (page.parent / target).exists():
