@@ -23,14 +23,18 @@ CIRCLES = {
 faults = []
 
 
+# Crates that lie beside `plugins/`.
+BESIDE_PLUGINS = ("app", "assets", "scenes", "tests")
+
+
 def table():
     """Names of our crates in the order of ARCHITECTURE's table."""
     rows = re.findall(r"^\| `(?:plugins/)?(\w[\w/-]*)` \|", (ROOT / "ARCHITECTURE.md").read_text(), re.M)
-    return [row for row in rows if (ROOT / "plugins" / row / "Cargo.toml").exists() or row in ("app", "tests")]
+    return [row for row in rows if (ROOT / "plugins" / row / "Cargo.toml").exists() or row in BESIDE_PLUGINS]
 
 
 def folder(crate):
-    return ROOT / crate if crate in ("app", "tests") else ROOT / "plugins" / crate
+    return ROOT / crate if crate in BESIDE_PLUGINS else ROOT / "plugins" / crate
 
 
 def name(crate):
@@ -131,7 +135,7 @@ for dependency in shared:
     if not re.search(rf"^{dependency}(\.workspace| = {{ workspace)", manifests, re.M):
         faults.append(f"Cargo.toml: no crate takes {dependency}: take it out")
 
-for page in [*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("plugins/*/README.md"), *ROOT.glob("plugins/*/docs/*.md"), *ROOT.glob("plugins/*/assets/*.md")]:
+for page in [*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("plugins/*/README.md"), *ROOT.glob("plugins/*/docs/*.md"), *ROOT.glob("assets/*/*.md")]:
     for link in re.findall(r"\]\(([^)\s]+)\)", page.read_text()):
         target = link.split("#")[0]
         if target and ":" not in target and not (page.parent / target).exists():

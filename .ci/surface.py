@@ -11,7 +11,7 @@ LIST = ROOT / ".ci" / "surface.txt"
 ITEM = re.compile(r"^\s*pub (?:const |async )?(fn|struct|enum|trait|type|mod|const|static) (\w+)", re.M)
 
 lines = []
-for folder in sorted([ROOT / "app", *(ROOT / "plugins").iterdir()]):
+for folder in sorted([ROOT / "app", ROOT / "assets", ROOT / "scenes", *(ROOT / "plugins").iterdir()]):
     for page in sorted(folder.glob("src/**/*.rs")):
         text = page.read_text().split("\n#[cfg(test)]\nmod tests {")[0]
         place = page.relative_to(ROOT).as_posix()

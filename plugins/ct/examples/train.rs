@@ -10,8 +10,8 @@ use intrados_stage::Job;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut args = std::env::args().skip(1);
-    let recipe_path = args.next().unwrap_or_else(|| "plugins/ct/assets/recipe.ron".into());
-    let out = args.next().unwrap_or_else(|| "plugins/ct/assets/unet.f32".into());
+    let recipe_path = args.next().unwrap_or_else(|| "assets/ct/recipe.ron".into());
+    let out = args.next().unwrap_or_else(|| "assets/ct/unet.f32".into());
     let recipe: Recipe = ron::from_str(&std::fs::read_to_string(recipe_path)?)?;
     let (begin, mut mean) = (Instant::now(), 0.0);
     let network = Network::trained(&recipe, &Job::default(), |step, loss, network| {

@@ -3,6 +3,7 @@
 
 use std::path::Path;
 
+use intrados_assets::GRADING;
 use intrados_ct::crack::Crack;
 use intrados_scene::Scene;
 use intrados_stage::{Estimate, access};
@@ -11,12 +12,6 @@ use serde::{Deserialize, Serialize};
 use crate::{evidence::Evidence, fusion};
 
 pub use crate::error::ProfileError;
-
-/// The profile that holds where nobody names another.
-const FOUR_STATES: &str = include_str!("../assets/four_states.ron");
-/// The profiles that are built in, by their names in scenes and on the command line.
-const BUILT_IN: [(&str, &str); 2] =
-    [("four_states", FOUR_STATES), ("tight_cracks", include_str!("../assets/tight_cracks.ron"))];
 
 /// Longest profile, bytes.
 const MAX_BYTES: u64 = 1 << 20;
@@ -115,7 +110,7 @@ pub struct CrackLimit {
 
 impl Default for Profile {
     fn default() -> Self {
-        Self::parse(FOUR_STATES).unwrap_or_else(|why| {
+        Self::parse(GRADING[0].1).unwrap_or_else(|why| {
             unreachable!("this text is part of the program, and a test reads it: {why}")
         })
     }
@@ -165,13 +160,13 @@ impl Profile {
     /// ```
     #[must_use]
     pub fn built_in(name: &str) -> Option<Self> {
-        let (_, text) = BUILT_IN.iter().find(|(known, _)| *known == name)?;
+        let (_, text) = GRADING.iter().find(|(known, _)| *known == name)?;
         Self::parse(text).ok()
     }
 
     /// Names of those that are built in.
     pub fn names() -> impl Iterator<Item = &'static str> {
-        BUILT_IN.iter().map(|(name, _)| *name)
+        GRADING.iter().map(|(name, _)| *name)
     }
 
     /// Reads a profile.
@@ -314,7 +309,7 @@ mod tests {
 
     #[test]
     fn the_built_in_profile_is_sound() {
-        let profile = Profile::parse(FOUR_STATES).unwrap();
+        let profile = Profile::parse(GRADING[0].1).unwrap();
         let state = |d, w| profile.state(d, w).unwrap().name.clone();
         assert_eq!(
             [state(0.0, 0.0), state(0.1, 0.0), state(0.0, 1.3), state(0.9, 0.0)],
@@ -333,7 +328,7 @@ mod tests {
     #[test]
     fn bad_profiles_are_refused_with_a_reason() {
         let says = |from: &str, to: &str| {
-            Profile::parse(&FOUR_STATES.replace(from, to)).unwrap_err().to_string()
+            Profile::parse(&GRADING[0].1.replace(from, to)).unwrap_err().to_string()
         };
         assert!(says("open_crack_mm: 1.0", "open_crack_mm: 0.0").contains("open_crack_mm"));
         assert!(says("from: 0.25", "from: 0.05").contains("rise"));

@@ -1,6 +1,6 @@
 //! Ours: the corrected slice, and a network that tells pores and cracks apart.
 //!
-//! The network is that of the crate with weights of its own (`plugins/ct/assets/member.ron`): it has
+//! The network is that of the crate with weights of its own (`assets/ct/member.ron`): it has
 //! learnt on drawn slices with the grain, blur and noise of scans of members, and a pore ends for
 //! it where half of the contrast is reached. Its shapes are spheres, lobed discs and sums of sines;
 //! it has seen none of these cases. What is chosen here was chosen on rehearsals.

@@ -1,7 +1,7 @@
 //! The language of the window.
 //!
 //! English stands in the code, where it is drawn: `tr!("{} of {}", done, all)`. What it is called
-//! elsewhere stands in `words/*.ron`, all languages beside each other. What a message lacks is said
+//! elsewhere stands in `assets/words/*.ron`, all languages beside each other. What a message lacks is said
 //! in English. What the engines say is found again by its words ([`term`]); files are English
 //! everywhere, so that they can be compared.
 //!
@@ -14,17 +14,9 @@ use std::{
 };
 
 use egui::{DragValue, Slider, emath::Numeric};
+use intrados_assets::WORDS;
 use serde::{Deserialize, Serialize};
 
-/// What is said in German and in Chinese, by what is said in English.
-const WORDS: [(&str, &str); 6] = [
-    ("common.ron", include_str!("../words/common.ron")),
-    ("files.ron", include_str!("../words/files.ron")),
-    ("window.ron", include_str!("../words/window.ron")),
-    ("member.ron", include_str!("../words/member.ron")),
-    ("terms.ron", include_str!("../words/terms.ron")),
-    ("told.ron", include_str!("../words/told.ron")),
-];
 /// Those that are said by [`term`]: words, and sentences of the engines.
 const TERMS: [&str; 2] = ["terms.ron", "told.ron"];
 
@@ -208,7 +200,7 @@ fn words() -> &'static HashMap<String, [String; 2]> {
 
 fn parsed(file: &str, text: &str) -> HashMap<String, [String; 2]> {
     ron::from_str(text).unwrap_or_else(|error| {
-        tracing::error!("words/{file}: {error}");
+        tracing::error!("assets/words/{file}: {error}");
         HashMap::new()
     })
 }

@@ -1,25 +1,16 @@
 //! A picture of light that is kept, to hold the present one of the same camera against it: side by
-//! side under a divider that is dragged, by their difference, by how different they look, and by
-//! figures.
+//! side under a divider that is dragged, by their difference, and by figures.
 
-mod flip;
-
-use std::{
-    ops::{AddAssign, Range},
-    sync::Arc,
-};
+use std::ops::{AddAssign, Range};
 
 use bevy_ecs::prelude::*;
 use egui::{
     Button, Color32, ColorImage, CursorIcon, Pos2, Rect, Response, Sense, TextureHandle, TextureId,
     TextureOptions, Ui, UiBuilder, pos2,
 };
-use flip::Flip;
 use glam::Vec3;
 use intrados_light::{Film, Render, luminance, tone::Tone};
-use intrados_raster::flip::PIXELS_PER_DEGREE;
 use intrados_scene::Camera;
-use intrados_stage::Jobs;
 use rayon::prelude::*;
 
 use crate::{
@@ -47,8 +38,6 @@ enum Shown {
     Picture,
     Reference,
     Difference,
-    /// How different the two look.
-    Flip,
     /// The reference on the left of the divider, the picture on its right.
     Wipe,
 }
@@ -66,7 +55,7 @@ struct Kept {
 /// The reference, and what the picture is against it.
 #[derive(Resource, Default)]
 pub(crate) struct Reference {
-    kept: Option<Arc<Kept>>,
+    kept: Option<Kept>,
     shown: Shown,
     /// Where the divider is: share of the width.
     wipe: f32,
@@ -81,7 +70,6 @@ pub(crate) struct Reference {
     /// Bands of the difference that are not uploaded yet, and the rows that they begin at.
     bands: Vec<(usize, ColorImage)>,
     difference: Option<TextureHandle>,
-    flip: Flip,
     /// The reference, developed at an exposure.
     texture: Option<(f32, TextureHandle)>,
 }
@@ -179,35 +167,32 @@ impl Kept {
         ColorImage::new(self.size, self.pixels.par_iter().map(colour).collect())
     }
 
-    /// What some rows of the picture are against it, their difference, and their means.
+    /// What some rows of the picture are against it, and their difference.
     fn compare(
         &self,
         parts: &[(&Film, f32)],
         look: &Look,
         rows: Range<usize>,
-    ) -> (Sums, ColorImage, Vec<Option<Vec3>>) {
+    ) -> (Sums, ColorImage) {
         let tone = Tone { exposure: look.exposure, ..Tone::default() };
         let width = self.size[0];
         let mut pixels = vec![colours::UNKNOWN; width * rows.len()];
-        let mut means: Vec<Option<Vec3>> = vec![None; width * rows.len()];
-        let row = |((row, means), y): ((&mut [Color32], &mut [Option<Vec3>]), usize)| {
+        let row = |(row, y): (&mut [Color32], usize)| {
             let mut sums = Sums::default();
-            for (x, (pixel, mean)) in row.iter_mut().zip(means).enumerate() {
+            for (x, pixel) in row.iter_mut().enumerate() {
                 let i = y * width + x;
                 let own = picture::blend(parts, look.order, i);
-                *mean = own.map(|own| own.0);
                 let Some((own, reference)) = own.zip(self.pixels[i]) else { continue };
                 sums += Sums::of(own, reference, self.floor);
                 *pixel = colour(&tone, (own.0 - reference.0).abs());
             }
             sums
         };
-        let both = pixels.par_chunks_mut(width).zip(means.par_chunks_mut(width));
-        let found: Vec<Sums> = both.zip(rows.clone()).map(row).collect();
+        let found: Vec<Sums> = pixels.par_chunks_mut(width).zip(rows.clone()).map(row).collect();
         // One after another: the same bits for any number of threads.
         let mut sums = Sums::default();
         found.into_iter().for_each(|row| sums += row);
-        (sums, ColorImage::new([width, rows.len()], pixels), means)
+        (sums, ColorImage::new([width, rows.len()], pixels))
     }
 }
 
@@ -231,7 +216,7 @@ pub(crate) fn keep(world: &mut World) {
     let parts = picture::parts(render, look.view, share);
     let kept = Kept::of(&parts, look.order, render.camera(), camera.clone());
     *world.resource_mut::<Reference>() =
-        Reference { kept: Some(Arc::new(kept)), wipe: 0.5, ..Reference::default() };
+        Reference { kept: Some(kept), wipe: 0.5, ..Reference::default() };
 }
 
 /// Goes on comparing, and lets the reference go once the camera is another one.
@@ -241,7 +226,6 @@ pub(crate) fn compare(
     viewpoint: Res<Viewpoint>,
     statistics: Res<Statistics>,
     mut reference: ResMut<Reference>,
-    mut jobs: ResMut<Jobs>,
     mut toasts: ResMut<Toasts>,
     mut log: ResMut<Log>,
 ) {
@@ -258,8 +242,7 @@ pub(crate) fn compare(
     // While the film is being made anew it has other pixels.
     let is_comparable = |r: &Res<Render>| size(r.camera()) == size_kept && !viewpoint.is_preview();
     if let Some(render) = render.filter(is_comparable) {
-        let jobs = jobs.bypass_change_detection();
-        reference.advance(&render, &look, statistics.share(&render), jobs);
+        reference.advance(&render, &look, statistics.share(&render));
     }
 }
 
@@ -270,11 +253,11 @@ impl Reference {
 
     /// Whether something of the film is not compared yet.
     pub(crate) fn is_behind(&self) -> bool {
-        self.kept.is_some() && (self.behind > 0 || self.flip.is_busy())
+        self.kept.is_some() && self.behind > 0
     }
 
-    /// Goes on with what is new in the film: the next band in the frame, FLIP off it.
-    fn advance(&mut self, render: &Render, look: &Look, share: f64, jobs: &mut Jobs) {
+    /// Goes on with what is new in the film: the next band.
+    fn advance(&mut self, render: &Render, look: &Look, share: f64) {
         let walks: u64 = render.exposures().iter().flatten().map(|e| e.walks).sum();
         if self.of != Some((walks, *look)) {
             let is_same = |of: (u64, Look)| (of.1.view, of.1.order) == (look.view, look.order);
@@ -286,9 +269,6 @@ impl Reference {
         if self.behind > 0 {
             self.compare_band(render, look, share);
         }
-        if let Some(kept) = &self.kept {
-            self.flip.go_on(kept, walks, self.behind == 0, jobs);
-        }
     }
 
     /// Compares the next band.
@@ -297,9 +277,8 @@ impl Reference {
         let height = kept.size[1];
         let rows = self.next * height / BANDS..(self.next + 1) * height / BANDS;
         let parts = picture::parts(render, look.view, share);
-        let (sums, image, means) = kept.compare(&parts, look, rows.clone());
+        let (sums, image) = kept.compare(&parts, look, rows.clone());
         self.sums[self.next] = Some(sums);
-        self.flip.put(look, self.next, means);
         if !rows.is_empty() {
             self.bands.retain(|(row, _)| *row != rows.start);
             self.bands.push((rows.start, image));
@@ -334,11 +313,6 @@ impl Reference {
                     tr!("Difference"),
                     tr!("How far the channels are apart, at the same exposure"),
                 ),
-                (
-                    Shown::Flip,
-                    tr!("FLIP"),
-                    tr!("How different each pixel looks to somebody who sees both in turn"),
-                ),
                 (Shown::Wipe, tr!("Wipe"), hint),
             ] {
                 ui.selectable_value(&mut self.shown, shown, name).on_hover_text(hint);
@@ -371,12 +345,11 @@ impl Reference {
     pub(crate) fn draw(&mut self, ui: &Ui, [rect, view]: [Rect; 2], look: &Look) {
         let part = match self.shown {
             Shown::Picture => return,
-            Shown::Reference | Shown::Difference | Shown::Flip => view,
+            Shown::Reference | Shown::Difference => view,
             Shown::Wipe => view.with_max_x(self.x(rect).min(view.right())),
         };
         let texture = match self.shown {
             Shown::Difference => self.difference(ui.ctx()),
-            Shown::Flip => self.flip.texture(ui.ctx(), look.colours),
             _ => self.texture(ui.ctx(), look.exposure),
         };
         if let Some(texture) = texture {
@@ -437,7 +410,7 @@ impl Reference {
     }
 
     /// How far the picture is from the reference, below it.
-    pub(crate) fn figures(&self, ui: &mut Ui, rect: Rect, look: &Look) {
+    pub(crate) fn figures(&self, ui: &mut Ui, rect: Rect) {
         if !self.is_kept() {
             return;
         }
@@ -448,22 +421,8 @@ impl Reference {
                     return;
                 };
                 told(ui, &found);
-                ui.separator();
-                self.tell_flip(ui);
-                if self.shown == Shown::Flip {
-                    flip::legend(ui, look.colours);
-                }
             })
         });
-    }
-
-    /// How different the two look on the whole.
-    fn tell_flip(&self, ui: &mut Ui) {
-        let mean = self.flip.mean().map_or_else(|| "…".into(), |mean| significant(mean, 3));
-        ui.label(tr!("FLIP {}", mean)).on_hover_text(tr!(
-            "Mean over the picture of how different a pixel looks, as both are shown at this exposure: 0 alike, 1 as different as can be; an eye sees {} pixels a degree (Andersson et al. 2020)",
-            PIXELS_PER_DEGREE
-        ));
     }
 }
 

@@ -174,7 +174,7 @@ pub(crate) fn render(
         // They may be wider than the picture.
         Quantity::Radiance => {
             let wide = below.with_min_x(area.left()).with_max_x(area.right());
-            reference.figures(ui, wide, &look);
+            reference.figures(ui, wide);
         }
         Quantity::Error => {
             let (scale, caption) = (picture::error_scale(&look), picture::error_caption());

@@ -1,6 +1,5 @@
 #![doc = include_str!("../README.md")]
 
-pub mod closeup;
 pub mod corner;
 mod edges;
 pub mod face;

@@ -1,6 +1,5 @@
 #![doc = include_str!("../README.md")]
 
-pub mod flip;
 pub mod grid;
 pub mod network;
 

@@ -27,22 +27,7 @@ const MAX_FILE: u64 = 4 << 30;
 /// The scenes that the program carries with it, by name.
 #[must_use]
 pub fn bundled() -> &'static [(&'static str, &'static str)] {
-    macro_rules! scenes {
-        ($($name:literal),*) => { &[$(($name, include_str!(concat!("../scenes/", $name, ".ron")))),*] };
-    }
-    scenes!(
-        "column",
-        "beam",
-        "tunnel",
-        "tunnel-pipe",
-        "specimens",
-        "cornell",
-        "room",
-        "slit",
-        "door",
-        "corridor",
-        "maze"
-    )
+    intrados_scenes::BUNDLED
 }
 
 /// What is written of a bundled scene, without loading it.

@@ -48,7 +48,7 @@ fn hashes_tell_scenes_apart_and_repeat() {
 /// The embedded text and the file in the repository are one scene.
 #[test]
 fn a_bundled_scene_is_the_file_of_its_name() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/door.ron");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/door.ron");
     let file = Scene::load(&path, &Job::default()).unwrap();
     assert_eq!(file.hash, load("door").hash);
     let elsewhere = Scene::open(Path::new("scenes/door.ron"), &Job::default()).unwrap();

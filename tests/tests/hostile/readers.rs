@@ -559,8 +559,8 @@ fn tables() -> Vec<Vec<u8>> {
 
 fn profiles() -> Vec<Vec<u8>> {
     [
-        include_str!("../../../plugins/damage/assets/four_states.ron"),
-        include_str!("../../../plugins/damage/assets/tight_cracks.ron"),
+        include_str!("../../../assets/grading/four_states.ron"),
+        include_str!("../../../assets/grading/tight_cracks.ron"),
     ]
     .map(|t| t.as_bytes().to_vec())
     .into()

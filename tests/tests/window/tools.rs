@@ -1014,33 +1014,6 @@ fn compared_pictures_are_turned_together_until_they_are_parted() {
     assert!(parted.position.distance(together.position) < 1e-3);
 }
 
-/// FLIP is computed off the frame, anew for another view, and shown pixel by pixel.
-#[test]
-fn flip_tells_how_different_a_picture_looks_from_its_reference() {
-    let mut window = Window::with_scene("cornell");
-    window.click("Primal");
-    window.until("some light", |w| w.resource::<Render>().samples_per_pixel() > 4.0);
-    window.click("⏸ Pause");
-    window.click("Keep as reference");
-    window.until_seen("FLIP 0");
-    window.click("Dual");
-    let flip = |window: &Window| -> Option<f64> {
-        said(window, "FLIP ").first()?.strip_prefix("FLIP ")?.parse().ok()
-    };
-    while flip(&window).is_none_or(|flip| flip == 0.0) {
-        window.frame();
-        rest();
-    }
-    assert!(flip(&window).is_some_and(|flip| flip < 1.0), "{:?}", flip(&window));
-    let rect = window.harness.get_by_label("Picture").rect();
-    let [own, difference, map] = ["This picture", "Difference", "FLIP"].map(|shown| {
-        window.click(shown);
-        window.frames(3);
-        columns(&window.picture(), rect)
-    });
-    assert!(map != own && map != difference);
-}
-
 /// A line over the picture of light is a plot with its length, and a table with standard errors;
 /// the camera stays where it is. Escape puts the tool away.
 #[test]

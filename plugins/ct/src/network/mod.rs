@@ -2,13 +2,14 @@
 //!
 //! An [`Unet`] of three levels of resolution. It sees two planes: how far grey lies from that of
 //! sound concrete, and where the body is. It was trained by [`train`] on the slices of
-//! [`simulate`], never on a real one; `assets` holds the weights and how they came to be.
+//! [`simulate`], never on a real one; `assets/ct` holds the weights and how they came to be.
 
 pub mod simulate;
 pub mod train;
 
 use std::{ops::Range, sync::LazyLock};
 
+use intrados_assets::ct as assets;
 use intrados_stage::{Cancelled, Job};
 use serde::{Deserialize, Serialize};
 
@@ -42,18 +43,12 @@ const TILE: usize = 768;
 /// more; a multiple of [`DIVISOR`], so that pixels pool alike.
 const MARGIN: usize = 32;
 
-/// The weights that the program carries, as little-endian floats, and how many planes the first
-/// level has.
-static CARRIED: &[u8] = include_bytes!("../../assets/unet.f32");
-
-/// Weights of another network of this kind, for scans of members.
-static MEMBER: &[u8] = include_bytes!("../../assets/member.f32");
-
 /// The network for scans of members.
-static OF_MEMBERS: LazyLock<Option<Network>> = LazyLock::new(|| Network::from_bytes(MEMBER));
+static OF_MEMBERS: LazyLock<Option<Network>> =
+    LazyLock::new(|| Network::from_bytes(assets::MEMBERS));
 
 /// The network that the program carries.
-static BUILTIN: LazyLock<Option<Network>> = LazyLock::new(|| Network::from_bytes(CARRIED));
+static BUILTIN: LazyLock<Option<Network>> = LazyLock::new(|| Network::from_bytes(assets::CORES));
 
 /// A trained network.
 #[derive(Debug, Clone, PartialEq)]
@@ -87,7 +82,7 @@ impl Network {
         BUILTIN.as_ref()
     }
 
-    /// The network that the program carries for scans of members (`plugins/ct/assets/member.ron`);
+    /// The network that the program carries for scans of members (`assets/ct/member.ron`);
     /// `None` if its weights are damaged.
     #[must_use]
     pub fn of_members() -> Option<&'static Self> {

@@ -3,7 +3,7 @@
 //!
 //! Two small U-Nets look at the picture, one for cracks first of all and one for all else. They
 //! were trained by [`train`] on rendered pictures alone ([`lesson`]): no photograph was shown to
-//! them, and only the thresholds of cracks were chosen on some. `plugins/photo/assets` holds the
+//! them, and only the thresholds of cracks were chosen on some. `assets/photo` holds the
 //! weights and how they came to be.
 
 mod camera;
@@ -17,6 +17,7 @@ pub mod train;
 use std::sync::LazyLock;
 
 use glam::Vec3;
+use intrados_assets::photo as assets;
 use intrados_raster::{
     Grid, Mask,
     network::{Planes, Shape, Spare, Unet},
@@ -58,12 +59,9 @@ const TILE: usize = 1024;
 /// cells.
 const MARGIN: usize = 128;
 
-/// The weights that the program carries, as little-endian floats: for cracks, and for all else.
-static CARRIED: [&[u8]; 2] =
-    [include_bytes!("../../assets/photo.f32"), include_bytes!("../../assets/areas.f32")];
-
 static BUILTIN: LazyLock<Option<Reader>> = LazyLock::new(|| {
-    let [cracks, areas] = CARRIED.map(|bytes| Network::from_bytes(&LEVELS, bytes));
+    let [cracks, areas] =
+        [assets::CRACKS, assets::AREAS].map(|bytes| Network::from_bytes(&LEVELS, bytes));
     Some(Reader { cracks: cracks?, areas: areas? })
 });
 

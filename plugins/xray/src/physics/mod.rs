@@ -26,7 +26,7 @@ pub use table::{Attenuation, Forms, Library, Material};
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum PhysicsError {
     /// A table that does not hold what it should.
-    #[error("{file}, line {line}: {problem}; remake it by plugins/xray/assets/make.py")]
+    #[error("{file}, line {line}: {problem}; remake it by assets/xray/make.py")]
     Table {
         /// Which asset.
         file: &'static str,

@@ -1,8 +1,8 @@
 //! What leaves the tube.
 
-use super::{Material, PhysicsError, table::rows};
+use intrados_assets::xray::TUBE;
 
-const TUBE: &str = include_str!("../../assets/tube.csv");
+use super::{Material, PhysicsError, table::rows};
 
 /// Spectra of the bare tube by voltage.
 #[derive(Debug, Clone, PartialEq)]

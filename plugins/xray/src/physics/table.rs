@@ -1,9 +1,8 @@
 //! The tables of `assets`, checked and interpolated.
 
-use super::PhysicsError;
+use intrados_assets::xray::{ATTENUATION, FORMS};
 
-const ATTENUATION: &str = include_str!("../../assets/attenuation.csv");
-const FORMS: &str = include_str!("../../assets/form.csv");
+use super::PhysicsError;
 
 /// μ/ρ by what happens, m²/kg.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
