@@ -339,3 +339,84 @@ fn what_import_assumes_of_a_lone_beam_are_bearings() {
         }
     }
 }
+
+/// A prism along x as an OBJ file: its outline across (y up), moved by `place`.
+fn prism(outline: &[[f64; 2]], length: f64, place: impl Fn(DVec3) -> DVec3) -> String {
+    let n = outline.len();
+    let mut text = "o Beam_1\n".to_owned();
+    for x in [0.0, length] {
+        for [z, y] in outline {
+            let [x, y, z] = place(DVec3::new(x, *y, *z)).to_array();
+            text += &format!("v {x} {y} {z}\n");
+        }
+    }
+    let list =
+        |of: &mut dyn Iterator<Item = usize>| of.map(|i| format!(" {}", i + 1)).collect::<String>();
+    text += &format!("f{}\nf{}\n", list(&mut (0..n)), list(&mut (n..2 * n).rev()));
+    for i in 0..n {
+        let k = (i + 1) % n;
+        text += &format!("f {} {} {} {}\n", k + 1, i + 1, i + n + 1, k + n + 1);
+    }
+    text
+}
+
+/// However a lone beam is shaped and lies, what import assumes of it turns with it: of an I, a T, and
+/// of a beam that rises by half a per cent or lies askew, half of the weight at each end and no moment
+/// about the line across.
+#[test]
+fn bearings_of_any_section_and_direction_do_not_clamp() {
+    let i: [[f64; 2]; 12] = [
+        [-0.3, 0.0],
+        [0.3, 0.0],
+        [0.3, 0.2],
+        [0.1, 0.2],
+        [0.1, 0.8],
+        [0.3, 0.8],
+        [0.3, 1.0],
+        [-0.3, 1.0],
+        [-0.3, 0.8],
+        [-0.1, 0.8],
+        [-0.1, 0.2],
+        [-0.3, 0.2],
+    ];
+    let t: [[f64; 2]; 8] = [
+        [-0.2, 0.0],
+        [0.2, 0.0],
+        [0.2, 0.9],
+        [1.0, 0.9],
+        [1.0, 1.1],
+        [-1.0, 1.1],
+        [-1.0, 0.9],
+        [-0.2, 0.9],
+    ];
+    let box_ = [[-0.2, 0.0], [0.2, 0.0], [0.2, 0.6], [-0.2, 0.6]];
+    let level = |p: DVec3| p;
+    let rising = |p: DVec3| p + 0.005 * p.x * DVec3::Y;
+    let askew = |p: DVec3| DVec3::new(0.8 * p.x - 0.6 * p.z, p.y, 0.6 * p.x + 0.8 * p.z);
+    let length = 10.0;
+    for (name, text, along) in [
+        ("I", prism(&i, length, level), DVec3::X),
+        ("T", prism(&t, length, level), DVec3::X),
+        ("rising", prism(&box_, length, rising), DVec3::X),
+        ("askew", prism(&box_, length, askew), DVec3::new(0.8, 0.0, 0.6)),
+    ] {
+        let place = tempfile::tempdir().unwrap();
+        let (file, folder) = (place.path().join("beam.obj"), place.path().join("out"));
+        std::fs::write(&file, text).unwrap();
+        let job = Job::default();
+        import(&file, &folder, &Told::default(), &Access::default(), &job).unwrap();
+        let scene = Scene::load(&folder.join("scene.ron"), &job).unwrap();
+        let found = whole(&scene, false, &job).unwrap();
+        let weight: f64 = found.reactions.iter().map(|r| r.force_n[1]).sum();
+        let across = along.cross(DVec3::Y);
+        for half in [false, true] {
+            let is_there = |at: [f64; 3]| (DVec3::from_array(at).dot(along) > 0.5 * length) == half;
+            let there: Vec<_> = found.reactions.iter().filter(|r| is_there(r.at_m)).collect();
+            let force: f64 = there.iter().map(|r| r.force_n[1]).sum();
+            let moment: f64 =
+                there.iter().map(|r| DVec3::from_array(r.moment_nm).dot(across).abs()).sum();
+            assert!((force / weight - 0.5).abs() < 0.01, "{name}: {force} N of {weight}");
+            assert!(moment < 1e-3 * weight * length, "{name}: {moment} N m");
+        }
+    }
+}

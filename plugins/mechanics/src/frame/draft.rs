@@ -30,6 +30,8 @@ const LONG: [f64; 2] = [2.5, 0.15];
 const STATIONS: f64 = 16.0;
 /// Samples of a place on a member.
 const SAMPLES: usize = 800;
+/// Samples count as lying at a line across from so far, shares of the length.
+const NEAR: f64 = 0.02;
 /// A node of a sheet is part of a contact where this share of the most that any node has of it is
 /// its.
 const PART: f64 = 0.4;
@@ -289,17 +291,30 @@ impl<'a> Part<'a> {
                         && towards.is_none_or(|t| s.normal.dot(t) > LOOKS)
                 };
                 if to - from < 1e-6 {
-                    // A line across: what is beside it, moved there.
-                    let length = self.axes.length;
-                    let shift = |mut s: Sample| {
-                        s.at += (from - self.share(s.at)) * length * along;
-                        s
-                    };
-                    return of(&is_side).into_iter().map(shift).collect();
+                    return self.line_across(of(&is_side), from, towards);
                 }
                 of(&|s| is_side(s) && (from..=to).contains(&self.share(s.at)))
             }
         }
+    }
+
+    /// A line across: samples of a side, moved to where it lies. Of a flange, a void's ceiling and
+    /// a haunch it is the outermost that is there: a bearing lies below all of it, and lets it turn
+    /// about itself.
+    fn line_across(&self, mut side: Vec<Sample>, from: f64, towards: Option<DVec3>) -> Vec<Sample> {
+        let (along, length) = (self.axes.unit[2], self.axes.length);
+        let level = |s: &Sample| towards.map_or(0.0, |t| (s.at - self.axes.start).dot(t));
+        let beside = |s: &Sample| (self.share(s.at) - from).abs();
+        let nearest = side.iter().map(beside).fold(f64::INFINITY, f64::min);
+        let near = side.iter().filter(|s| beside(s) <= nearest + NEAR);
+        let outermost = near.map(level).fold(f64::NEG_INFINITY, f64::max);
+        for s in &mut side {
+            s.at += (from - self.share(s.at)) * length * along;
+            if let Some(towards) = towards {
+                s.at += (outermost - level(s)) * towards;
+            }
+        }
+        side
     }
 
     /// Its points that bear what is at `at`, with their shares: the stations on both sides, or the

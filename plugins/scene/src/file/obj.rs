@@ -170,6 +170,20 @@ struct Lines {
     notes: Vec<String>,
 }
 
+/// What a comment says of the file's unit, as exporters write it: no part of OBJ, and not metres.
+fn unit_said(name: &str, comment: &str) -> Option<String> {
+    const UNITS: [&str; 9] =
+        ["inch", "feet", "foot", "millimet", "centimet", "decimet", " mm", " cm", "=mm"];
+    let low = comment.to_lowercase();
+    let is_said = low.contains("unit") && UNITS.iter().any(|unit| low.contains(unit));
+    is_said.then(|| {
+        format!(
+            "{name}: a comment says \"{}\", which no reader of OBJ heeds: metres are taken, give --unit if it is right",
+            super::shorten(comment.trim_start_matches('#').trim())
+        )
+    })
+}
+
 /// A face as it is written: the line, and the vertices, negative ones counted already.
 struct Face {
     line: usize,
@@ -195,6 +209,7 @@ impl Lines {
                 line.split_once(|c: char| c.is_ascii_whitespace()).unwrap_or((line, ""));
             let numbers = rest.split('#').next().unwrap_or_default();
             match word {
+                _ if word.starts_with('#') => all.notes.extend(unit_said(name, line)),
                 "v" => {
                     let mut read = numbers.split_ascii_whitespace();
                     let mut number = || coordinate(read.next()?, &mut commas);
@@ -215,7 +230,8 @@ impl Lines {
                     faces.push(Face { line: number, run: all.runs.len() - 1, corners });
                 }
                 "o" => {
-                    all.objects.push(rest.trim().to_owned());
+                    // A tab within a name is a space.
+                    all.objects.push(rest.trim().replace(char::is_control, " "));
                     let object = Some(all.objects.len() - 1);
                     all.runs.push(Run { object, ..Run::default() });
                 }

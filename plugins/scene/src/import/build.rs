@@ -48,7 +48,7 @@ pub(super) struct Built {
     /// Sentences about what was read with a doubt, with the names of what they are about.
     pub(super) doubts: BTreeMap<String, Vec<String>>,
     /// Materials by name: how many members or bars are of each, and what was made of it.
-    pub(super) materials: BTreeMap<String, (usize, String)>,
+    pub(super) materials: BTreeMap<(String, String), usize>,
     /// Names of the steel that lies in no member.
     pub(super) loose: Vec<String>,
 }
@@ -389,8 +389,8 @@ impl Builder {
 
     /// Counts a member or bar of these materials.
     fn note_materials(&mut self, materials: Vec<(String, String)>) {
-        for (name, taken_for) in materials {
-            self.built.materials.entry(name).or_insert((0, taken_for)).0 += 1;
+        for material in materials {
+            *self.built.materials.entry(material).or_default() += 1;
         }
     }
 

@@ -17,6 +17,10 @@ const SAME: f64 = 5e-3;
 const SAME_SHARE: f64 = 0.01;
 /// Share of two boxes' union in both beyond which one may be the other, drawn again.
 const MOST: f64 = 0.8;
+/// A body that fills so much of its box is one, and lies in another if so much of it does.
+const MOST_OF_PART: f64 = 0.9;
+/// Members that are compared, each with each.
+const COMPARED: usize = 4000;
 /// So far a part may stand out of its whole, m.
 const OUT: f64 = 0.02;
 /// Points of a part that are looked for in its whole.
@@ -169,6 +173,7 @@ fn copies(pieces: &[Piece], gone: &BTreeSet<usize>, notes: &mut Vec<String>) -> 
         }
         cells.entry(cell).or_default().push(k);
     }
+    notes.extend(within(pieces, &places, &lost));
     if !twice.is_empty() {
         let what = match twice.len() {
             1 => "a member lies twice at one place and counts once".to_owned(),
@@ -183,6 +188,47 @@ fn copies(pieces: &[Piece], gone: &BTreeSet<usize>, notes: &mut Vec<String>) -> 
         ));
     }
     lost.into_iter().collect()
+}
+
+/// Members most of which lies in another, which both fill their boxes: a column over all storeys beside
+/// its storeys, a core beside what it is the core of. Of more than [`COMPARED`] nobody looks.
+fn within(pieces: &[Piece], places: &[Place], lost: &HashSet<usize>) -> Option<String> {
+    let places: Vec<&Place> = places.iter().filter(|p| !lost.contains(&p.index)).collect();
+    if places.len() > COMPARED {
+        return None;
+    }
+    let name = |p: &Place| crate::file::shorten(&pieces[p.index].element.name);
+    let mut found: Vec<(f64, String)> = Vec::new();
+    for (k, one) in places.iter().enumerate() {
+        for other in &places[..k] {
+            let [small, large] =
+                if one.volume < other.volume { [one, other] } else { [other, one] };
+            if shared(one, other) <= MOST && inside(small, large) > MOST_OF_PART {
+                let pair = format!("\"{}\" in \"{}\"", name(small), name(large));
+                found.push((small.volume, pair));
+            }
+        }
+    }
+    let volume: f64 = found.iter().map(|f| f.0).sum();
+    let pairs: Vec<String> = found.into_iter().map(|f| f.1).collect();
+    (!pairs.is_empty()).then(|| {
+        format!(
+            "members lie within others ({}): are {volume:.2} m³ counted twice? Both count; take one out of the model if they are",
+            listed(&pairs)
+        )
+    })
+}
+
+/// Share of the smaller box that lies in the larger, where both bodies fill most of theirs.
+fn inside(small: &Place, large: &Place) -> f64 {
+    let volume = |[low, high]: [DVec3; 2]| (high - low).max(DVec3::ZERO).element_product();
+    let [own, other] = [volume(small.bounds), volume(large.bounds)];
+    if small.volume < MOST_OF_PART * own || large.volume < MOST_OF_PART * other {
+        return 0.0;
+    }
+    let low = small.bounds[0].max(large.bounds[0]);
+    let high = small.bounds[1].min(large.bounds[1]);
+    volume([low, high]) / own.max(1e-12)
 }
 
 fn neighbours(cell: [i64; 3]) -> impl Iterator<Item = [i64; 3]> {

@@ -34,15 +34,57 @@ fn letters(name: &str) -> String {
     name.to_lowercase().chars().filter(|c| c.is_alphabetic()).collect()
 }
 
-/// The cover that a property set says, mm. `metres`: of the file's unit of length.
+/// What follows in names of what is said about a cover and is none.
+const ABOUT: [&str; 14] = [
+    "deviation",
+    "tolerance",
+    "toleranz",
+    "vorhalte",
+    "utili",
+    "count",
+    "number",
+    "class",
+    "klasse",
+    "fire",
+    "ratio",
+    "loss",
+    "check",
+    "spacer",
+];
+
+/// The cover that property sets say, mm: the least of several, with a doubt. `metres`: of the file's
+/// unit of length.
 pub(super) fn cover_mm(element: &Element, metres: f64) -> Doubted<f32> {
     let all = element.properties.iter().flat_map(|(set, v)| v.iter().map(move |p| (set, p)));
-    let mut said = all.filter(|(_, (name, _))| {
+    let is_cover = |name: &str| {
         let name = letters(name);
-        COVERS.iter().any(|cover| name.starts_with(cover))
-    });
-    let Some((set, (name, value))) = said.next() else { return (None, None) };
-    let place = format!("{set}.{name} says");
+        COVERS.iter().any(|cover| {
+            let rest = name.strip_prefix(cover);
+            rest.is_some_and(|rest| !ABOUT.iter().any(|about| rest.contains(about)))
+        })
+    };
+    let mut least: Doubted<f32> = (None, None);
+    let mut differ: Option<String> = None;
+    for (set, (name, value)) in all.filter(|(_, (name, _))| is_cover(name)) {
+        let (mm, doubt) = cover_of(&format!("{set}.{name} says"), value, metres);
+        match (mm, least.0) {
+            (Some(mm), Some(known)) if mm != known => {
+                let lower = mm.min(known);
+                differ = Some(format!(
+                    "{set}.{name} says {mm} mm and another property {known} mm: the least, {lower} mm, is taken all around"
+                ));
+                if mm < known {
+                    least = (Some(mm), doubt);
+                }
+            }
+            (None, Some(_)) | (Some(_), Some(_)) => {}
+            (mm, None) => least = (mm, least.1.or(doubt)),
+        }
+    }
+    (least.0, differ.or(least.1))
+}
+
+fn cover_of(place: &str, value: &Value, metres: f64) -> Doubted<f32> {
     let (metres, doubt) = match value.as_str() {
         Some(text) => of_text(text, metres),
         None => match Quantity::of(value) {
@@ -154,6 +196,26 @@ mod tests {
         let mut element = Element::default();
         element.properties.entry("Pset".into()).or_default().insert(name.into(), value);
         element
+    }
+
+    /// What is said about a cover is none; of several the least holds, with a doubt.
+    #[test]
+    fn what_is_about_a_cover_is_no_cover() {
+        for name in [
+            "ConcreteCoverDeviation",
+            "ConcreteCoverTolerance",
+            "ConcreteCoverUtilisation",
+            "ConcreteCoverCount",
+            "ConcreteCoverClass",
+        ] {
+            assert_eq!(cover_mm(&with(name, json!(12.0)), 1e-3), (None, None), "{name}");
+        }
+        let mut several = with("ConcreteCoverTop", json!(60.0));
+        let set = several.properties.get_mut("Pset").unwrap();
+        set.insert("ConcreteCoverBottom".into(), json!(30.0));
+        set.insert("ConcreteCoverDeviation".into(), json!(10.0));
+        let (mm, doubt) = cover_mm(&several, 1e-3);
+        assert!(mm == Some(30.0) && doubt.unwrap().contains("the least, 30 mm"));
     }
 
     #[test]

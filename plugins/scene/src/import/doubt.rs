@@ -17,8 +17,12 @@ const LONG: f64 = 50.0;
 /// One that is flat may be, where it is so thick, m.
 const PLATE: [f64; 2] = [0.05, 1.5];
 const LONG_PLATE: f64 = 500.0;
+/// Columns and beams are rarely so wide, m.
+const THICK: f64 = 8.0;
 /// A structure whose longest member is shorter is a model of one, m.
 const SHORT: f64 = 0.5;
+/// No structure's longest column or beam is shorter, m.
+const TINY: f64 = 0.1;
 /// So many times longer than the next measure is slender or flat.
 const SLENDER: f64 = 2.0;
 /// Looks along an axis of the world, by its cosine.
@@ -83,6 +87,10 @@ pub(super) fn doubts(source: &Source, built: &Built, told: &Told) -> Vec<String>
         .map(|(found, solid)| Body::new(&found.name, found.kind, Some(found.by), solid))
         .collect();
     let mut doubts = Vec::new();
+    if source.format.starts_with("IFC") {
+        doubts.extend(of_ifc(&members));
+        return doubts;
+    }
     if told.up.is_none() {
         doubts.extend(match members.is_empty() {
             true => unnamed_up(source),
@@ -131,6 +139,24 @@ fn unnamed_up(source: &Source) -> Option<String> {
     })
 }
 
+/// IFC says its unit, and which way is up; whether numbers are in that unit nobody says.
+fn of_ifc(members: &[Body]) -> Option<String> {
+    let bars = |m: &&Body| matches!(m.kind, MemberKind::Column | MemberKind::Beam);
+    let all: Vec<&Body> = members.iter().filter(bars).collect();
+    let longest = all.iter().max_by(|a, b| a.size[2].total_cmp(&b.size[2]))?;
+    let widest = all.iter().max_by(|a, b| a.size[1].total_cmp(&b.size[1]))?;
+    let (odd, what) = match () {
+        () if longest.size[2] < TINY => (longest, "long"),
+        () if widest.size[1] > THICK => (widest, "wide"),
+        () => return None,
+    };
+    let size = if what == "long" { odd.size[2] } else { odd.size[1] };
+    Some(format!(
+        "\"{}\" is {size:.3} m {what} in the file's own unit of length: are its numbers in another? Export the model again if so",
+        shorten(odd.name)
+    ))
+}
+
 /// Whether members have sizes that members have in metres.
 fn unit(format: &str, members: &[Body]) -> Option<String> {
     let solid = |m: &&Body| {
@@ -161,6 +187,15 @@ fn unit(format: &str, members: &[Body]) -> Option<String> {
         return Some(format!(
             "{}: is the file in {likely}? {says}: say --unit, or --unit m if it is right",
             size(long)
+        ));
+    }
+    let is_thick =
+        |m: &&&Body| matches!(m.kind, MemberKind::Column | MemberKind::Beam) && m.size[1] > THICK;
+    if let Some(thick) = all.iter().find(is_thick) {
+        return Some(format!(
+            "\"{}\" is {:.1} m wide: is the file in another unit? {says}: say --unit, or --unit m if it is right",
+            shorten(thick.name),
+            thick.size[1]
         ));
     }
     if longest.size[2] < SHORT {

@@ -59,6 +59,9 @@ pub(super) fn composition(element: &Element) -> Composition {
                 concrete = concrete.or(Some(reading));
             }
         }
+        if let Some(doubt) = matter::doubt(material) {
+            found.doubts.push(format!("material \"{}\": {doubt}", label(material)));
+        }
         match &understood.substance {
             Substance::Other(matter) => others.push(matter.clone()),
             Substance::Unknown | Substance::Bars => found.unknown.push(label(material)),
@@ -128,24 +131,48 @@ fn words(concrete: &Concrete) -> String {
     }
 }
 
-/// The first strength that a property says, and which one; doubts are added to a list.
+/// The first strength that properties say, and which one; doubts are added to a list, also of others
+/// that say another.
 fn strength_of(sets: &Properties, doubts: &mut Vec<String>) -> Option<(String, Reading)> {
+    let mut found: Vec<(String, Reading)> = Vec::new();
     for (set, values) in sets {
+        // Tested on what, said beside it.
+        let on_cubes = values.iter().any(|(name, value)| {
+            name.to_lowercase().contains("specimen")
+                && value.as_str().is_some_and(|text| strength::is_cube(&text.to_lowercase()))
+        });
         for (name, value) in values {
             let place = format!("{set}.{name}");
-            match of_property(name, value) {
-                Some(Ok(reading)) => {
-                    if reading.is_doubtful {
-                        doubts.push(format!("{place}: {}", reading.meaning));
-                    }
-                    return Some((place, reading));
-                }
+            let named = if on_cubes { format!("{name} cube") } else { name.clone() };
+            match of_property(&named, value) {
+                Some(Ok(reading)) => found.push((place, reading)),
                 Some(Err(why)) => doubts.push(format!("{place} says {}: {why}", said(value))),
                 None => {}
             }
         }
     }
-    None
+    let (place, reading) = found.first().cloned()?;
+    let differs =
+        |one: &&(String, Reading)| (mpa(&one.1.concrete) - mpa(&reading.concrete)).abs() > 0.05;
+    if let Some((other, its)) = found.iter().find(differs) {
+        doubts.push(format!(
+            "{place} says {} and {other} says {}: the first is taken",
+            words(&reading.concrete),
+            words(&its.concrete)
+        ));
+    }
+    if reading.is_doubtful {
+        doubts.push(format!("{place}: {}", reading.meaning));
+    }
+    Some((place, reading))
+}
+
+/// Characteristic strength of cylinders, MPa.
+fn mpa(concrete: &Concrete) -> f64 {
+    match concrete {
+        Concrete::Class(class) => f64::from(crate::file::concrete_class(class).unwrap_or(30.0)),
+        Concrete::Strength(mpa) => f64::from(*mpa),
+    }
 }
 
 fn said(value: &Value) -> String {
@@ -163,19 +190,29 @@ fn of_property(name: &str, value: &Value) -> Option<Result<Reading, String>> {
     let words = words_of(name);
     let has = |list: &[&str]| words.iter().any(|word| list.contains(&word.as_str()));
     let holds = |list: &[&str]| list.iter().any(|part| joined.contains(part));
-    if holds(&["reinforcement", "rebar", "steel", "yield", "bewehrung", "masonry", "mortar"])
-        || has(&["grain", "wood", "timber", "soil"])
+    const OTHERS: [&str; 16] = [
+        "reinforcement",
+        "rebar",
+        "steel",
+        "yield",
+        "bewehrung",
+        "masonry",
+        "mortar",
+        "rock",
+        "aggregate",
+        "grout",
+        "cement",
+        "zement",
+        "insulation",
+        "dämm",
+        "screed",
+        "estrich",
+    ];
+    if holds(&OTHERS)
+        || has(&["grain", "wood", "timber", "soil", "stone", "brick", "block", "factor", "ratio"])
     {
         return None;
     }
-    const CLASSES: [&str; 6] = [
-        "strengthclass",
-        "concreteclass",
-        "concretegrade",
-        "betongüte",
-        "betonklasse",
-        "festigkeitsklasse",
-    ];
     const STRENGTHS: [&str; 9] = [
         "compressivestrength",
         "compressionstrength",
@@ -187,13 +224,51 @@ fn of_property(name: &str, value: &Value) -> Option<Result<Reading, String>> {
         "druckfestigkeit",
         "specifiedstrength",
     ];
-    if holds(&CLASSES) {
-        let text = value.as_str().filter(|t| !t.trim().is_empty())?;
+    const CLASSES: [&str; 7] = [
+        "concretestrength",
+        "strengthclass",
+        "concreteclass",
+        "concretegrade",
+        "betongüte",
+        "betonklasse",
+        "festigkeitsklasse",
+    ];
+    let is_class = holds(&CLASSES);
+    // Whatever it is called, a whole class is no number of something else.
+    let is_whole =
+        || value.as_str().is_some_and(|text| strength::pair(&text.to_uppercase()).is_some());
+    let is_about = holds(&["concrete", "beton", "strength", "resist"]);
+    if has(&[
+        "blinding",
+        "sauberkeit",
+        "sauberkeitsschicht",
+        "topping",
+        "infill",
+        "filling",
+        "foundation",
+    ]) && (is_class || holds(&STRENGTHS))
+    {
+        return Some(Err("it is of another part than this, and is not used".into()));
+    }
+    let is_said = is_class || is_about && !holds(&STRENGTHS) && is_whole();
+    let is_number = |text: &str| text.trim().trim_end_matches('.').parse::<f64>().is_ok();
+    if let Some(text) = value.as_str().filter(|text| is_said && !is_number(text)) {
+        if text.trim().is_empty() {
+            return None;
+        }
         let unread = "it is no class that is known, and is not used".to_owned();
         return Some(strength::of_text(text).ok_or(unread));
     }
-    if !holds(&STRENGTHS) && joined != "fc" {
+    if !holds(&STRENGTHS) && joined != "fc" && !is_class {
         return None;
+    }
+    // CompressiveStrength150x150x150, fck7.
+    let sizes: Vec<u32> = words.iter().filter_map(|word| word.parse().ok()).collect();
+    let is_prism = sizes.len() > 1 && sizes.iter().all(|n| (100..=300).contains(n));
+    if let [days] = sizes[..]
+        && days < 28
+    {
+        return Some(Err(format!("this is the strength after {days} days, and is not used")));
     }
     // Of a test: when it was made, by which method, on which day.
     if has(&["age", "alter", "prüfalter", "date", "datum", "method", "standard", "norm", "number"])
@@ -201,20 +276,41 @@ fn of_property(name: &str, value: &Value) -> Option<Result<Reading, String>> {
     {
         return early(&words).map(Err);
     }
-    if has(&["early", "transfer", "release", "stripping", "initial", "frühfestigkeit"]) {
+    const EARLY: [&str; 12] = [
+        "early",
+        "transfer",
+        "release",
+        "stripping",
+        "initial",
+        "frühfestigkeit",
+        "demoulding",
+        "demolding",
+        "prestressing",
+        "loading",
+        "lifting",
+        "handling",
+    ];
+    if has(&EARLY) {
         return Some(Err("this is no strength after 28 days, and is not used".into()));
+    }
+    if has(&["target", "measured", "core", "actual", "insitu", "test", "ziel"]) {
+        return Some(Err(
+            "a target or a measured strength is no characteristic one, and is not used".into(),
+        ));
     }
     if has(&["design", "fcd", "bemessung", "bemessungswert"]) {
         return Some(Err("a design strength has its safety factor in it, and is not used".into()));
     }
     let is_mean = has(&["mean", "average", "mittel", "mittelwert", "fcm"]);
-    Some(of_number(value, strength::is_cube(&format!("{} {joined}", name.to_lowercase())), is_mean))
+    let is_cube = strength::is_cube(&format!("{} {joined}", name.to_lowercase()))
+        || is_prism && sizes.iter().all(|n| *n == sizes[0]);
+    Some(of_number(value, is_cube, is_mean))
 }
 
 /// A strength after so many days is early where there are fewer than 28.
 fn early(words: &[String]) -> Option<String> {
     let days = words.iter().find_map(|word| word.parse::<u32>().ok())?;
-    (days < 28).then(|| format!("this is the strength after {days} days, and is not used"))
+    (days != 28).then(|| format!("this is the strength after {days} days, and is not used"))
 }
 
 /// Words of a property's name, in small letters: `CompressiveStrength28Days`.
@@ -253,8 +349,9 @@ const PLAUSIBLE: std::ops::RangeInclusive<f64> = 8.0..=120.0;
 fn of_number(value: &Value, is_cube: bool, is_mean: bool) -> Result<Reading, String> {
     if let Some(text) = value.as_str() {
         if let Some((mpa, _)) = strength::mpa_in(text) {
-            let is_cube = is_cube || strength::is_cube(&text.to_lowercase());
-            return of_mpa((mpa, None), is_cube, is_mean);
+            let low = text.to_lowercase();
+            let is_mean = is_mean || low.contains("fcm") || low.contains("mean");
+            return of_mpa((mpa, None), is_cube || strength::is_cube(&low), is_mean);
         }
         if let Some(reading) = strength::of_text(text) {
             return Ok(reading);
@@ -373,6 +470,52 @@ mod tests {
         let strength = put("Pset_MaterialConcrete", "CompressiveStrength", 4.2e7.into());
         assert_eq!(strength.unwrap(), "42 MPa");
         assert_eq!(put("A", "StrengthClass", "C50/60".into()).unwrap(), "C50/60");
+    }
+
+    /// What another matter, another part or another day has is no strength of this concrete; whether
+    /// it says so or is passed over.
+    #[test]
+    fn only_what_is_said_of_this_concrete_counts() {
+        for name in [
+            "RockUnconfinedCompressiveStrength",
+            "AggregateCompressiveStrength",
+            "GroutCompressiveStrength",
+            "CementCompressiveStrength",
+            "CompressiveStrengthReductionFactor",
+            "DemouldingCompressiveStrength",
+            "CompressiveStrengthAtPrestressing",
+            "TargetCompressiveStrength",
+            "CoreCompressiveStrength",
+            "fck7",
+            "CompressiveStrength90Days",
+        ] {
+            assert_eq!(class(&with("P", name, 45.0.into())), None, "{name}");
+        }
+        for name in ["ConcreteGradeOfFoundation", "BlindingConcreteClass", "ToppingStrengthClass"] {
+            assert_eq!(class(&with("P", name, "C12/15".into())), None, "{name}");
+        }
+        for (name, value, expected) in [
+            ("CompressiveStrength", "30-37 MPa".into(), "C30/37"),
+            ("CompressiveStrength", "fcm = 38 MPa".into(), "C30/37"),
+            ("CompressiveStrength150x150x150", 37.0.into(), "C30/37"),
+            ("CompressiveStrength28Days", 30.0.into(), "C30/37"),
+            ("ConcreteStrength", "C40/50".into(), "C40/50"),
+            ("StrengthClass", "30.".into(), "C30/37"),
+        ] {
+            assert_eq!(class(&with("P", name, value)).as_deref(), Some(expected), "{name}");
+        }
+        let mut two = with("P", "CompressiveStrength", 30.0.into());
+        two.properties.get_mut("P").unwrap().insert("StrengthClass".into(), "C50/60".into());
+        let found = composition(&two);
+        assert_eq!(found.concrete.map(|c| words(&c)).as_deref(), Some("C30/37"));
+        assert!(
+            found.doubts.iter().any(|d| d.contains("the first is taken")),
+            "{:?}",
+            found.doubts
+        );
+        let mut on_cubes = with("P", "CompressiveStrength", 37.0.into());
+        on_cubes.properties.get_mut("P").unwrap().insert("SpecimenType".into(), "Cube".into());
+        assert_eq!(class(&on_cubes).as_deref(), Some("C30/37"));
     }
 
     /// Columns are called C20, beams B15, and walls M30: none is a grade.

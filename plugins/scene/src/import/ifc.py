@@ -184,7 +184,7 @@ def above(element):
     told, here = [], element
     for _ in range(20):
         try:
-            here = about.get_aggregate(here) or about.get_container(here)
+            here = about.get_aggregate(here) or about.get_nest(here) or about.get_container(here)
         except Exception:
             here = None
         if here is None:

@@ -106,6 +106,17 @@ const PERHAPS: [&str; 8] = [
 const ASKED: [&str; 6] =
     ["IfcRoof", "IfcStair", "IfcStairFlight", "IfcRamp", "IfcRampFlight", "IfcChimney"];
 
+/// Classes that drawings of decks, slabs and piers have ended in: asked about where a name says so.
+const DRAWN_AS: [&str; 8] = [
+    "IfcCovering",
+    "IfcDiscreteAccessory",
+    "IfcFlowSegment",
+    "IfcFurnishingElement",
+    "IfcFurniture",
+    "IfcGeographicElement",
+    "IfcShadingDevice",
+    "IfcTransportElement",
+];
 /// Classes that lie on others, or on the ground.
 const SURFACING: [&str; 3] = ["IfcPavement", "IfcCourse", "IfcKerb"];
 
@@ -404,7 +415,11 @@ pub(super) fn kind(element: &Element, solid: Option<&Box3>, tube: Option<&Tube>)
     }
     let bears = BEARING.contains(&class);
     if !bears && !PERHAPS.contains(&class) {
-        return Verdict::Scenery(if ASKED.contains(&class) { Why::Unknown } else { Why::Class });
+        // A slab that was drawn as furniture is asked about.
+        let is_called = || by_name(element, false, solid).is_some();
+        let is_asked =
+            ASKED.contains(&class) || DRAWN_AS.contains(&class) && idle.is_none() && is_called();
+        return Verdict::Scenery(if is_asked { Why::Unknown } else { Why::Class });
     }
     if let Some(kind) = by_properties(element) {
         return Verdict::Member(kind, By::Properties);
@@ -432,7 +447,8 @@ const LARGEST_BEARING: f64 = 1.0;
 fn idle(element: &Element) -> Option<Why> {
     let own: Vec<String> =
         std::iter::once(&element.name).chain(&element.words).flat_map(|n| words(n)).collect();
-    let materials: Vec<String> = element.materials.iter().flat_map(|m| words(&m.name)).collect();
+    let materials: Vec<Vec<String>> =
+        element.materials.iter().map(|m| words(&m.name).collect()).collect();
     IDLE.iter().find_map(|(why, all)| {
         // A Widerlager is no Lager.
         let is_one = |word: &str, w: &str| {
@@ -441,7 +457,9 @@ fn idle(element: &Element) -> Option<Why> {
                 || (*why != Why::Bearing && w.len() >= 5 && word.ends_with(w))
         };
         let said = |words: &[String]| words.iter().any(|word| all.iter().any(|w| is_one(word, w)));
-        let is_said = said(&own) || (*why == Why::Surfacing && said(&materials));
+        // A slab with asphalt on it is a slab.
+        let is_all = !materials.is_empty() && materials.iter().all(|words| said(words));
+        let is_said = said(&own) || (*why == Why::Surfacing && is_all);
         let is_small = *why != Why::Bearing || element.surface.volume() < LARGEST_BEARING;
         (is_said && is_small).then_some(*why)
     })
@@ -639,6 +657,14 @@ mod tests {
         assert_eq!(name("color swatch"), None);
         assert_eq!(name("tunnel segment 4"), Some(MemberKind::Segment));
         assert_eq!(told(&named("IfcRailing", "beam")), Verdict::Scenery(Why::Class));
+        for (class, name, why) in [
+            ("IfcFurnishingElement", "Deck slab", Why::Unknown),
+            ("IfcShadingDevice", "Slab", Why::Unknown),
+            ("IfcFlowSegment", "Pier 2", Why::Unknown),
+            ("IfcFurniture", "chair", Why::Class),
+        ] {
+            assert_eq!(told(&named(class, name)), Verdict::Scenery(why), "{class} {name}");
+        }
         assert_eq!(told(&named("IfcTendon", "x")), Verdict::Steel(MemberKind::Tendon));
     }
 

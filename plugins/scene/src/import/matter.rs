@@ -45,23 +45,41 @@ struct Family {
     strength: Option<f32>,
 }
 
-const CONCRETES: [&str; 16] = [
+const CONCRETES: [&str; 12] = [
     "concrete",
     "beton",
     "béton",
     "hormig",
     "calcestruzzo",
     "concreto",
-    "reinforced",
     "betão",
     "бетон",
     "混凝土",
     "コンクリート",
     "콘크리트",
     "ortbet",
-    "conc",
-    "armeret",
-    "rc",
+];
+/// Whole words that say concrete where nothing else is said.
+const SHORT: [&str; 4] = ["conc", "rc", "reinforced", "armeret"];
+/// Words of what has concrete in it, or is no usual one: who knows what it weighs and bears.
+const MIXED: [&str; 17] = [
+    "composite",
+    "filled",
+    "encased",
+    "verbund",
+    "foamed",
+    "cellular",
+    "schaum",
+    "styropor",
+    "block",
+    "polymer",
+    "fiber reinforced",
+    "fibre reinforced",
+    "carbon",
+    "glass",
+    "autoclaved",
+    "perlite",
+    "no-fines",
 ];
 
 /// Masonry and what is laid like it: E = 1000 f_k of EN 1996-1-1, 3.7.2, with f_k = 5 MPa.
@@ -442,6 +460,26 @@ fn timber_class(name: &str, is_timber: bool) -> Option<(f32, f32)> {
     })
 }
 
+/// What speaks against what a name alone was taken for: C24 and C27 are classes of concrete, too.
+pub(super) fn doubt(material: &Matter) -> Option<String> {
+    let name = material.name.trim();
+    let low = name.to_lowercase();
+    let is_light = ["lightweight", "light weight", "leichtbeton"].iter().any(|w| low.contains(w));
+    if is_light && !strength::of_text(name).is_some_and(|reading| reading.is_lightweight) {
+        return Some(
+            "lightweight concrete without its class (LC30/33): normal concrete is taken".into(),
+        );
+    }
+    let is_alone = name.strip_prefix(['C', 'c']).is_some_and(|n| n.parse::<u32>().is_ok());
+    (is_alone && timber_class(name, false).is_some() && material.category.trim().is_empty()).then(
+        || {
+            format!(
+                "{name} is a class of timber (EN 338), and in some countries one of concrete: timber is taken"
+            )
+        },
+    )
+}
+
 /// Whether a name is one that programs give where nobody chose a material.
 fn is_unsaid(name: &str) -> bool {
     const NAMES: [&str; 18] = [
@@ -502,17 +540,34 @@ fn substance(material: &Matter, text: &str, is_named: bool) -> Substance {
     if let Some(family) = BEFORE_CONCRETE.into_iter().find(|f| is_of(text, f)) {
         return of(family);
     }
-    let is_concrete = CONCRETES.iter().any(|word| has(text, word));
+    let whole = |word: &&str| text.split(|c: char| !c.is_alphanumeric()).any(|w| w == *word);
     let others = || AFTER_CONCRETE.into_iter().filter(|f| is_of(text, f));
+    let is_named_so = CONCRETES.iter().any(|word| has(text, word));
+    let is_concrete = is_named_so || SHORT.iter().any(whole) && others().next().is_none();
+    let is_of_bars = has(text, "betonstahl") || has(text, "bewehrung");
     let names = [material.name.as_str(), material.category.as_str()];
     let by_name = || names.into_iter().find_map(strength::of_text);
+    if is_of_bars && names.into_iter().any(|name| super::grade::grade_in(name).is_some()) {
+        return Substance::Bars;
+    }
     if is_concrete {
-        // Steel in concrete is what its bars are; of wood and concrete, or PVC, who knows.
-        let clash = |f: &Family| [TIMBER.name, PLASTIC.name, GYPSUM.name].contains(&f.name);
-        return if others().any(clash) {
-            Substance::Unknown
-        } else {
-            Substance::Concrete(by_name())
+        // Steel in concrete is what its bars are, unless it is of sections; of wood and concrete,
+        // PVC or foam, who knows.
+        let clash = |f: &Family| {
+            [TIMBER.name, PLASTIC.name, GYPSUM.name, INSULATION.name, SOIL.name].contains(&f.name)
+        };
+        let is_mixed = MIXED.iter().any(|word| text.contains(word));
+        let has_section = steel_grade(&material.name).is_some();
+        // What the material's own name says is more than its category.
+        let own = material.name.to_lowercase();
+        if has_section && is_of(&own, &STEEL) && !CONCRETES.iter().any(|word| has(&own, word)) {
+            return of(&STEEL);
+        }
+        let pair = || names.into_iter().find_map(|name| strength::pair(&name.to_uppercase()));
+        return match pair().filter(|pair| pair.is_lightweight) {
+            Some(light) => Substance::Concrete(Some(light)),
+            None if is_mixed || has_section || others().any(clash) => Substance::Unknown,
+            None => Substance::Concrete(by_name()),
         };
     }
     if let Some(family) = others().next() {
@@ -521,8 +576,17 @@ fn substance(material: &Matter, text: &str, is_named: bool) -> Substance {
     if steel_grade(&material.name).is_some() {
         return of(&STEEL);
     }
-    if timber_class(&material.name, false).is_some() {
+    let pair = |name: &str| strength::pair(&name.to_uppercase()).is_some();
+    if timber_class(&material.name, false).is_some() && !names.into_iter().any(pair) {
         return of(&TIMBER);
+    }
+    // Of these a number says no concrete.
+    const NO_CONCRETE: [&str; 10] = [
+        "grout", "mortar", "mörtel", "bolt", "screw", "anchor", "screed", "estrich", "soil",
+        "gravel",
+    ];
+    if NO_CONCRETE.iter().any(|word| text.contains(word)) {
+        return Substance::Unknown;
     }
     if let Some(reading) = by_name() {
         return Substance::Concrete(Some(reading));
@@ -642,6 +706,23 @@ mod tests {
         assert_eq!(density("Asphaltbeton"), ASPHALT.density);
         assert_eq!(density("stone_granite_masonry"), MASONRY.density);
         assert_eq!(density("Wärmedämmung - hart"), INSULATION.density);
+        assert_eq!(density("Reinforced earth"), SOIL.density);
+        for steel in ["Reinforced steel S355", "Concealed steel S355"] {
+            assert_eq!(density(steel), STEEL.density, "{steel}");
+        }
+        for unknown in [
+            "Concrete filled steel tube",
+            "Steel-concrete composite",
+            "Steel S355 concrete encased",
+            "Styroporbeton",
+            "Foamed concrete",
+            "Mortar M10",
+            "Bolts M20",
+        ] {
+            assert_eq!(of(unknown), Substance::Unknown, "{unknown}");
+        }
+        assert_eq!(of("Betonstahl B500B"), Substance::Bars);
+        assert!(matches!(of("C24/30"), Substance::Concrete(_)));
         for unknown in ["Solid 397409098", "XK-12", "Holz-Beton-Verbund", "PVC concrete"] {
             assert_eq!(of(unknown), Substance::Unknown, "{unknown}");
         }

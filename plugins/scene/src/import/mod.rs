@@ -255,9 +255,7 @@ pub fn import(
     unknown_names(path, &source, &told.kinds)?;
     let mut built = build::build(&source, model, &told.kinds, &job.part(0.8, 0.95))?;
     measure(path, &mut built, told, extension == "ifc")?;
-    if extension != "ifc" {
-        built.notes.extend(doubt::doubts(&source, &built, told));
-    }
+    built.notes.extend(doubt::doubts(&source, &built, told));
     project::write(path, folder, &source, &built, told, &job.part(0.95, 1.0))
 }
 

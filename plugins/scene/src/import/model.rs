@@ -176,7 +176,10 @@ pub(super) fn obj(path: &Path, told: &Told) -> Result<(Source, Model), ImportErr
         project: path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default(),
         elements: read.parts.into_iter().map(element).collect(),
         metres_per_unit: told.metres.unwrap_or(1.0),
-        notes: read.notes,
+        // Of a unit that is given nothing is to be said.
+        notes: (read.notes.into_iter())
+            .filter(|note| told.metres.is_none() || !note.contains("give --unit"))
+            .collect(),
         ..Source::default()
     };
     Ok((source, Model::default()))

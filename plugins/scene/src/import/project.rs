@@ -688,7 +688,7 @@ fn summary(
         concrete_assumed: count(Assumed::Concrete),
         reinforcement_assumed: count(Assumed::Reinforcement),
         materials: (built.materials.iter())
-            .map(|(name, (elements, taken_for))| MaterialUse {
+            .map(|((name, taken_for), elements)| MaterialUse {
                 name: name.clone(),
                 elements: *elements,
                 taken_for: taken_for.clone(),

@@ -124,7 +124,9 @@ fn origin(text: &str) -> Origin {
         Origin::Cyrillic
     } else if is_cube(&low)
         || low.chars().any(is_chinese)
-        || words().any(|w| ["gb", "bs", "bs8110", "gb50010", "is", "is456"].contains(&w))
+        || words().any(|w| ["gb", "bs", "bs8110", "gb50010", "is456"].contains(&w))
+        || low.contains("is 456")
+        || low.contains("is:456")
     {
         Origin::Cubes
     } else if ["beton", "ortbet", "fertigteil", "festigkeit", "güte", "din"]
@@ -148,7 +150,25 @@ pub(super) fn is_cube(low: &str) -> bool {
 pub(super) fn of_text(text: &str) -> Option<Reading> {
     // С, В and М of the Cyrillic alphabet look like the Latin ones.
     let upper: String = text.to_uppercase().replace('С', "C").replace('В', "B").replace('М', "M");
-    pair(&upper).or_else(|| by_unit(text)).or_else(|| notation(&upper, origin(text)))
+    pair(&upper)
+        .or_else(|| bare_pair(&upper))
+        .or_else(|| by_unit(text))
+        .or_else(|| notation(&upper, origin(text)))
+}
+
+/// `30/37` alone: nothing else goes by such a pair.
+fn bare_pair(upper: &str) -> Option<Reading> {
+    let (cylinder, cube) = upper.trim().split_once('/')?;
+    let pair = (cylinder.trim().parse().ok()?, cube.trim().parse().ok()?);
+    PAIRS.contains(&pair).then_some(())?;
+    let name = format!("C{}/{}", pair.0, pair.1);
+    let meaning = format!("class {name}, its C being left out");
+    Some(Reading {
+        concrete: Concrete::Class(name),
+        meaning,
+        is_doubtful: true,
+        is_lightweight: false,
+    })
 }
 
 /// A class by cylinders and cubes, `C30/37`; with another sign between them (`C35-45`) only where
@@ -157,7 +177,8 @@ pub(super) fn pair(upper: &str) -> Option<Reading> {
     upper.match_indices('C').find_map(|(at, _)| {
         let before = upper.get(..at)?;
         let is_light = before.ends_with('L') && !ends_in_word(&before[..before.len() - 1]);
-        let is_heavy = before.ends_with('H') && !ends_in_word(&before[..before.len() - 1]);
+        // LC is light, HC heavy, RC reinforced.
+        let is_heavy = before.ends_with(['H', 'R']) && !ends_in_word(&before[..before.len() - 1]);
         if ends_in_word(before) && !is_light && !is_heavy {
             return None;
         }
@@ -221,11 +242,38 @@ pub(super) fn mpa_in(text: &str) -> Option<(f64, String)> {
             i + before.get(i..).and_then(|r| r.chars().next()).map_or(1, char::len_utf8)
         });
     let number = decimal(before.get(begin..)?.trim_matches(['.', ',']))?;
-    Some((number * scale, format!("{number} {name}")))
+    // Of a range the lower end.
+    let lower = before.get(..begin).and_then(|rest| {
+        let rest = rest.trim_end().strip_suffix(['-', '–', '/'])?.trim_end();
+        let start = rest
+            .rfind(|c: char| !(c.is_ascii_digit() || c == '.'))
+            .map_or(0, |i| i + rest[i..].chars().next().map_or(1, char::len_utf8));
+        decimal(rest.get(start..)?).filter(|lower| *lower < number)
+    });
+    Some((lower.unwrap_or(number) * scale, format!("{} {name}", lower.unwrap_or(number))))
+}
+
+/// What stands before a number says that it is another strength than the characteristic one in
+/// compression: in tension, for design, of some days.
+fn is_another(low: &str) -> bool {
+    const OTHERS: [&str; 12] = [
+        "fct", "ftk", "fcd", "tensile", "tension", "flexural", "bending", "design", "zug", "biege",
+        "days", "tage",
+    ];
+    OTHERS.iter().any(|word| low.contains(word)) && !low.contains("28 d") && !low.contains("28d")
 }
 
 fn by_unit(text: &str) -> Option<Reading> {
     let (mpa, said) = mpa_in(text)?;
+    let low = text.to_lowercase();
+    if is_another(&low) {
+        return None;
+    }
+    if ["fcm", "mean", "mittel"].iter().any(|word| low.contains(word)) {
+        // EN 1992-1-1, table 3.1.
+        let meaning = format!("{said} in the mean, f_ck = {:.1} MPa", mpa - 8.0);
+        return reading(mpa - 8.0, meaning, true);
+    }
     if is_cube(&text.to_lowercase()) {
         return reading(of_cube(mpa), format!("{said} on cubes"), false);
     }
@@ -338,6 +386,12 @@ fn class_b(upper: &str, origin: Origin) -> Option<Reading> {
 
 /// `M30`: Indian cubes; `M300`, `K300`: kg/cm².
 fn class_m(upper: &str) -> Option<Reading> {
+    // Mortars and bolts are called so, too.
+    const NO_CONCRETE: [&str; 8] =
+        ["BOLT", "SCREW", "ANCHOR", "NUT", "STUD", "MORTAR", "MÖRTEL", "DÜBEL"];
+    if NO_CONCRETE.iter().any(|word| upper.contains(word)) {
+        return None;
+    }
     if let Some(number) = prefixed(upper, "M") {
         if (100.0..=800.0).contains(&number) {
             return mark(number, "M", "Soviet Union, GOST");
@@ -438,6 +492,11 @@ mod tests {
             ("C40 混凝土", "C32/40"),
             ("BS 8110 C40", "C32/40"),
             ("37 MPa cube", "C30/37"),
+            ("RC32/40", "C32/40"),
+            ("RC 25/30", "C25/30"),
+            ("30/37", "C30/37"),
+            ("30-37 MPa", "C30/37"),
+            ("fcm 38 MPa", "C30/37"),
         ] {
             is(text, expected);
         }
@@ -452,6 +511,11 @@ mod tests {
             "250 MPa",
             "C24",
             "COL 30",
+            "fctk 6.0 MPa",
+            "fcd 20 MPa",
+            "7 days 20 MPa",
+            "Bolts M20",
+            "Mortar M10",
         ] {
             assert_eq!(class(none), None, "{none}");
         }
@@ -462,6 +526,7 @@ mod tests {
     #[test]
     fn two_meanings_are_doubted() {
         assert_eq!(class("C40").as_deref(), Some("C32/40"));
+        assert!(is_doubtful("This is C40 concrete"));
         assert!(is_doubtful("C40") && is_doubtful("B35") && is_doubtful("B300"));
         assert!(is_doubtful("LC30/33") && is_doubtful("C30/33"));
         assert!(!is_doubtful("C30/37") && !is_doubtful("Stahlbeton C40") && !is_doubtful("M30"));
