@@ -300,6 +300,18 @@ fn relatives_of_ours_with_data() {
         }
     }
     no_members();
+    layers_and_sizes();
+}
+
+/// A slab with asphalt on it is a slab of concrete; numbers that are in another unit than the file
+/// says are doubted.
+fn layers_and_sizes() {
+    let layers = "#50=IFCMATERIAL('Asphalt',$,$);\n#51=IFCMATERIAL('Concrete C35/45',$,$);\n#52=IFCMATERIALLAYER(#50,120.,$,$,$,$,$);\n#53=IFCMATERIALLAYER(#51,250.,$,$,$,$,$);\n#54=IFCMATERIALLAYERSET((#52,#53),$,$);\n#55=IFCRELASSOCIATESMATERIAL('3VXNCsitnAX8OWtmb9QzHN',$,$,$,(#33),#54);\n";
+    let slab = Import::written(&column(layers).replace("IFCCOLUMN(", "IFCSLAB("));
+    slab.says("asphalt on a slab", &["concrete: \"C35/45\""]);
+    assert_eq!(slab.report["members"]["slab"], 1, "{}", slab.report);
+    let in_metres = column("").replace("400.,400.", "0.4,0.4").replace(",4000.)", ",4.)");
+    Import::written(&in_metres).says("metres called mm", &["are its numbers in another?"]);
 }
 
 /// An IFC file is told what IFC needs.

@@ -230,7 +230,7 @@ impl<'a> Part<'a> {
         let solid = Solid::new(&points, &triangles).ok_or("its surface encloses nothing")?;
         let axes = match &assembly.body {
             Some(_) => Axes::of(&assembly.frame),
-            None => imported::frame(member.kind, &points, turn),
+            None => imported::axes(member, &points, turn),
         };
         let shape = Shape::of(assembly, &axes, &solid)
             .ok_or("its surface is cut into no sections: close it")?;

@@ -34,9 +34,8 @@ pub(super) fn fill<'a>(
         });
     };
     let (points, triangles, turn) = surface(scene, member);
-    let is_stated = member.frame != Frame::of_box(member.kind, member.bounds);
-    let boxed = frame(member.kind, &points, turn);
-    let own = if is_stated { Axes::of(&member.frame) } else { boxed };
+    let (is_stated, boxed) = (is_stated(member), frame(member.kind, &points, turn));
+    let own = axes(member, &points, turn);
     let in_axes = |axes: &Axes| {
         let local: Vec<DVec3> = points.iter().map(|&p| axes.local(p)).collect();
         let [low, high] = local
@@ -169,8 +168,21 @@ fn orthonormal(m: DMat3) -> Option<DMat3> {
         .then(|| DMat3::from_cols(x, y, z))
 }
 
+/// Whether its model states its frame, rather than its box.
+fn is_stated(member: &Member) -> bool {
+    member.frame != Frame::of_box(member.kind, member.bounds)
+}
+
+/// The frame that its model states, else that of its box.
+pub(crate) fn axes(member: &Member, points: &[DVec3], turn: DMat3) -> Axes {
+    match is_stated(member) {
+        true => Axes::of(&member.frame),
+        false => frame(member.kind, points, turn),
+    }
+}
+
 /// The frame of the box along the axes of the node.
-pub(crate) fn frame(kind: MemberKind, points: &[DVec3], turn: DMat3) -> Axes {
+fn frame(kind: MemberKind, points: &[DVec3], turn: DMat3) -> Axes {
     let columns = [turn.x_axis, turn.y_axis, turn.z_axis];
     let span = |axis: DVec3| {
         points
