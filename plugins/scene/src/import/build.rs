@@ -116,6 +116,8 @@ pub(super) fn build(
         surfaces: Vec::new(),
         renamed: Vec::new(),
         dropped: BTreeSet::new(),
+        runs: HashSet::new(),
+        again: Vec::new(),
     };
     builder.clear();
     let mut pieces = Vec::with_capacity(elements.len());
@@ -186,6 +188,10 @@ struct Builder {
     renamed: Vec<String>,
     /// Objects of the model that another shows now.
     dropped: BTreeSet<usize>,
+    /// Where bars run, mm, from both ends.
+    runs: HashSet<Vec<[i64; 3]>>,
+    /// Names of bars that run where another does.
+    again: Vec<String>,
 }
 
 impl Builder {
@@ -195,6 +201,12 @@ impl Builder {
             self.built.notes.push(format!(
                 "{} members have a GlobalId that another has before them (such as {first}): they are called by it with a number, \"{first} #2\"; IFC wants each only once",
                 self.renamed.len()
+            ));
+        }
+        if !self.again.is_empty() {
+            self.built.notes.push(format!(
+                "bars run where others do, and count once: {}",
+                several(&self.again)
             ));
         }
         let rings = || self.built.found.iter().filter(|f| !f.segments.is_empty());
@@ -514,7 +526,7 @@ impl Builder {
             self.loose(element, &in_none, is_tendon);
         }
         for (k, (course, host)) in courses.iter().zip(hosts).enumerate() {
-            if host.is_none() {
+            if host.is_none() || self.is_again(element, course) {
                 continue;
             }
             let part = match is_tendon {
@@ -531,6 +543,19 @@ impl Builder {
                 found.bars += usize::from(part != Part::Stirrup);
             }
         }
+    }
+
+    /// Whether a bar runs where one does already: two never share an axis.
+    fn is_again(&mut self, element: &Element, course: &Course) -> bool {
+        let run = |p: &DVec3| (1e3 * *p).round().to_array().map(|x| x as i64);
+        let mut there: Vec<[i64; 3]> = course.line.iter().map(run).collect();
+        let back: Vec<[i64; 3]> = there.iter().rev().copied().collect();
+        there = there.min(back);
+        let is_new = there.len() < 2 || self.runs.insert(there);
+        if !is_new {
+            self.again.push(element.name.clone());
+        }
+        !is_new
     }
 
     /// For each bar of an element the member that most of it lies in, else the one that the element

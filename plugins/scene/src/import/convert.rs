@@ -395,6 +395,17 @@ fn remarks(answer: &Answer) -> Vec<String> {
             crate::file::shorten(&answer.year_text)
         ));
     }
+    if answer.year.is_none() && !answer.year_text.is_empty() && answer.year_text != "None" {
+        notes.push(format!(
+            "its year of construction is \"{}\", no year from 1800 on: it is not used; say --year",
+            crate::file::shorten(&answer.year_text)
+        ));
+    }
+    if let Some(year) = answer.year.filter(|y| i64::from(*y) > super::project::this_year() as i64) {
+        notes.push(format!(
+            "its year of construction, {year}, is to come: no age follows from it; say --year"
+        ));
+    }
     if answer.steel_without_shape > 0 {
         notes.push(format!(
             "{} reinforcing bars, meshes or tendons have no shape and are not used: export them with their geometry",

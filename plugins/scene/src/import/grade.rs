@@ -56,7 +56,14 @@ pub(super) fn composition(element: &Element) -> Composition {
                     let name = label(material);
                     found.doubts.push(format!("material \"{name}\": {}", reading.meaning));
                 }
-                concrete = concrete.or(Some(reading));
+                let first = concrete.get_or_insert_with(|| reading.clone());
+                if mpa(&first.concrete) != mpa(&reading.concrete) {
+                    found.doubts.push(format!(
+                        "its materials are {} and {}: the first is taken for all of it",
+                        words(&first.concrete),
+                        words(&reading.concrete)
+                    ));
+                }
             }
         }
         if let Some(doubt) = matter::doubt(material) {
@@ -73,6 +80,16 @@ pub(super) fn composition(element: &Element) -> Composition {
         found.other = dominant(others);
         found.unknown.clear();
         return found;
+    }
+    let light: Vec<&str> = (others.iter())
+        .filter(|matter| is_concrete && matter.density_kg_m3 < 7000.0)
+        .map(|matter| matter.name.as_str())
+        .collect();
+    if !light.is_empty() {
+        found.doubts.push(format!(
+            "it is of concrete and {}: all of it is computed as concrete",
+            light.join(" and ")
+        ));
     }
     // What is said of the element itself comes before its materials.
     if let Some((place, own)) = strength_of(&element.properties, &mut found.doubts) {
@@ -586,6 +603,27 @@ mod tests {
             of(&["C30/37", "B500B"]),
             Composition { doubts: vec![], ..of(&["C30/37", "B500B"]) }
         );
+    }
+
+    /// What is not all of one concrete is computed so, and said.
+    #[test]
+    fn layers_of_other_matter_are_doubted() {
+        let of = |names: &[&str]| {
+            let matter = |name: &&str| Matter { name: (*name).into(), ..Matter::default() };
+            let materials = names.iter().map(matter).collect();
+            composition(&Element { class: "IfcSlab".into(), materials, ..Element::default() })
+        };
+        for (names, doubt) in [
+            (&["Concrete C30/37", "Insulation EPS"][..], "computed as concrete"),
+            (&["Concrete C30/37", "Brick"], "computed as concrete"),
+            (&["C20/25", "C50/60"], "the first is taken"),
+        ] {
+            let found = of(names);
+            assert!(found.doubts.iter().any(|d| d.contains(doubt)), "{names:?} {:?}", found.doubts);
+        }
+        for names in [&["Concrete C30/37"][..], &["Concrete C30/37", "Steel B500B"]] {
+            assert_eq!(of(names).doubts, [""; 0], "{names:?}");
+        }
     }
 
     #[test]

@@ -418,14 +418,18 @@ def map_conversion(model):
 
 def year(model):
     """When it was built, from any property of that name, and the text that says so."""
+    unread = ""
     for name in ("IfcBuilding", "IfcFacility", "IfcFacilityPart", "IfcSite", "IfcProject"):
         for thing in instances(model, name):
             for values in properties(thing).values():
                 for key, value in values.items():
+                    if not re.search(r"year.?of.?construction|construction.?year|baujahr", key, re.I):
+                        continue
                     found = re.search(r"\b(1[89]|20)\d\d\b", str(value))
-                    if re.search(r"year.?of.?construction|construction.?year|baujahr", key, re.I) and found:
+                    if found:
                         return int(found.group()), str(value)
-    return None, ""
+                    unread = unread or str(value).strip()
+    return None, unread
 
 
 def disks(representation, matrix):

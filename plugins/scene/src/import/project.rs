@@ -268,7 +268,7 @@ fn measures(found: &Found) -> Measures {
     }
 }
 
-fn this_year() -> u64 {
+pub(super) fn this_year() -> u64 {
     let since = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs());
     1970 + since / 31_556_952
 }
