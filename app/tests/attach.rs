@@ -802,3 +802,17 @@ fn validate_says_what_a_member_cannot_hear() {
     assert!(told[1].contains("evidence of B1") && told[1].contains("and 1 more"), "{told:?}");
     assert!(told[1].contains("none are known of the member"), "{told:?}");
 }
+
+/// A project whose folder is called as a bundled scene is the project.
+#[test]
+fn a_project_is_known_before_a_bundled_scene_of_its_name() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::create_dir(folder.path().join("column")).unwrap();
+    let mut command = program();
+    command.current_dir(folder.path()).args(["new", "column", "column/scene.ron"]);
+    assert!(command.output().unwrap().status.success());
+    let mut command = program();
+    let output = command.current_dir(folder.path()).args(["info", "column"]).output().unwrap();
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(text.contains("column/scene.ron") && !text.contains("hall"), "{text}");
+}

@@ -276,8 +276,8 @@ impl Scene {
         Ok(scene)
     }
 
-    /// What a user means who writes `scene`: a file if there is one, else a bundled scene by its
-    /// name or its path in the repository (`scenes/column.ron`).
+    /// What a user means who writes `scene`: a file or a project's folder if there is one, else a
+    /// bundled scene by its name or its path in the repository (`scenes/column.ron`).
     ///
     /// # Errors
     /// As [`Scene::load`].
@@ -294,12 +294,12 @@ impl Scene {
             Ok(rest) => rest.with_extension(""),
             Err(_) => scene.to_path_buf(),
         };
-        match bundled().iter().find(|(n, _)| !scene.is_file() && Path::new(n) == name) {
+        // A project is known by its folder, whatever a bundled scene is called.
+        let is_project = scene.join(PROJECT).is_file();
+        let is_there = is_project || scene.is_file();
+        match bundled().iter().find(|(n, _)| !is_there && Path::new(n) == name) {
             Some((name, _)) => Self::load_bundled(name, job),
-            // A project is known by its folder.
-            None if scene.join(PROJECT).is_file() => {
-                Self::load_within(&scene.join(PROJECT), access, job)
-            }
+            None if is_project => Self::load_within(&scene.join(PROJECT), access, job),
             None => Self::load_within(scene, access, job).map_err(|error| error.or_bundled(&name)),
         }
     }
