@@ -11,7 +11,7 @@ use std::{
     process::Output,
 };
 
-use common::{run, text};
+use common::{program, run, text};
 use serde_json::Value;
 
 const SCENE: &str = r#"(
