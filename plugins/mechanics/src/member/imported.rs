@@ -34,7 +34,6 @@ pub(super) fn fill<'a>(
         });
     };
     let (points, triangles, turn) = surface(scene, member);
-    let (is_stated, boxed) = (is_stated(member), frame(member.kind, &points, turn));
     let own = axes(member, &points, turn);
     let in_axes = |axes: &Axes| {
         let local: Vec<DVec3> = points.iter().map(|&p| axes.local(p)).collect();
@@ -47,7 +46,10 @@ pub(super) fn fill<'a>(
     };
     // Along its faces cubes miss a chamfer all along; across them they meet it on the average.
     let (axes, voxels) = match in_axes(&own) {
-        Err(MemberError::Unsupported { .. }) if is_stated => (boxed, in_axes(&boxed)?),
+        Err(MemberError::Unsupported { .. }) if is_stated(member) => {
+            let boxed = frame(member.kind, &points, turn);
+            (boxed, in_axes(&boxed)?)
+        }
         found => (own, found?),
     };
     let mut draft = Draft::new(scene, assembly, axes);

@@ -47,7 +47,7 @@ pub(super) struct Built {
     pub(super) idle: Vec<Idle>,
     /// Sentences about what was read with a doubt, with the names of what they are about.
     pub(super) doubts: BTreeMap<String, Vec<String>>,
-    /// Materials by name: how many members or bars are of each, and what was made of it.
+    /// Materials by name and what was made of them: how many members or bars are of each.
     pub(super) materials: BTreeMap<(String, String), usize>,
     /// Names of the steel that lies in no member.
     pub(super) loose: Vec<String>,

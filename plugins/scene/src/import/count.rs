@@ -221,14 +221,20 @@ fn within(pieces: &[Piece], places: &[Place], lost: &HashSet<usize>) -> Option<S
 
 /// Share of the smaller box that lies in the larger, where both bodies fill most of theirs.
 fn inside(small: &Place, large: &Place) -> f64 {
-    let volume = |[low, high]: [DVec3; 2]| (high - low).max(DVec3::ZERO).element_product();
-    let [own, other] = [volume(small.bounds), volume(large.bounds)];
+    let [own, other] = [box_volume(small.bounds), box_volume(large.bounds)];
     if small.volume < MOST_OF_PART * own || large.volume < MOST_OF_PART * other {
         return 0.0;
     }
-    let low = small.bounds[0].max(large.bounds[0]);
-    let high = small.bounds[1].min(large.bounds[1]);
-    volume([low, high]) / own.max(1e-12)
+    box_volume(common(small, large)) / own.max(1e-12)
+}
+
+fn box_volume([low, high]: [DVec3; 2]) -> f64 {
+    (high - low).max(DVec3::ZERO).element_product()
+}
+
+/// The box that lies in both boxes.
+fn common(a: &Place, b: &Place) -> [DVec3; 2] {
+    [a.bounds[0].max(b.bounds[0]), a.bounds[1].min(b.bounds[1])]
 }
 
 fn neighbours(cell: [i64; 3]) -> impl Iterator<Item = [i64; 3]> {
@@ -246,9 +252,8 @@ fn is_same(a: &Place, b: &Place) -> bool {
 
 /// Share of the union of two boxes that lies in both, where both fill most of theirs.
 fn shared(a: &Place, b: &Place) -> f64 {
-    let volume = |[low, high]: [DVec3; 2]| (high - low).max(DVec3::ZERO).element_product();
-    let both = volume([a.bounds[0].max(b.bounds[0]), a.bounds[1].min(b.bounds[1])]);
-    let [first, second] = [volume(a.bounds), volume(b.bounds)];
+    let both = box_volume(common(a, b));
+    let [first, second] = [box_volume(a.bounds), box_volume(b.bounds)];
     if a.volume < 0.5 * first || b.volume < 0.5 * second {
         return 0.0;
     }

@@ -145,14 +145,15 @@ fn of_ifc(members: &[Body]) -> Option<String> {
     let all: Vec<&Body> = members.iter().filter(bars).collect();
     let longest = all.iter().max_by(|a, b| a.size[2].total_cmp(&b.size[2]))?;
     let widest = all.iter().max_by(|a, b| a.size[1].total_cmp(&b.size[1]))?;
-    let (odd, what) = match () {
-        () if longest.size[2] < TINY => (longest, "long"),
-        () if widest.size[1] > THICK => (widest, "wide"),
-        () => return None,
+    let (odd, size) = if longest.size[2] < TINY {
+        (longest, format!("{:.3} m long", longest.size[2]))
+    } else if widest.size[1] > THICK {
+        (widest, format!("{:.3} m wide", widest.size[1]))
+    } else {
+        return None;
     };
-    let size = if what == "long" { odd.size[2] } else { odd.size[1] };
     Some(format!(
-        "\"{}\" is {size:.3} m {what} in the file's own unit of length: are its numbers in another? Export the model again if so",
+        "\"{}\" is {size} in the file's own unit of length: are its numbers in another? Export the model again if so",
         shorten(odd.name)
     ))
 }

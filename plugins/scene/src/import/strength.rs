@@ -274,7 +274,7 @@ fn by_unit(text: &str) -> Option<Reading> {
         let meaning = format!("{said} in the mean, f_ck = {:.1} MPa", mpa - 8.0);
         return reading(mpa - 8.0, meaning, true);
     }
-    if is_cube(&text.to_lowercase()) {
+    if is_cube(&low) {
         return reading(of_cube(mpa), format!("{said} on cubes"), false);
     }
     reading(mpa, format!("{said} on cylinders"), false)
