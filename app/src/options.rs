@@ -55,6 +55,7 @@ const RELIT: &[Fact] = &[Given("relight"), Given("read")];
 const CORNERS: &[Fact] = &[Given("corners")];
 const UNPLACED: &[Fact] = &[Given("corners"), PHOTOGRAPH];
 const OF_PLAIN_FILE: &[Fact] = &[Given("pose")];
+const FILES: &[Fact] = &[Given("files")];
 
 /// A row of [`RULES`].
 const fn rule(
@@ -101,19 +102,19 @@ const RULES: &[OptionRule] = &[
     free("attach", "date"),
     free("attach", "instrument"),
     rule("attach", "picture", &[], &[Given("load_test")]),
-    free("attach", "unit"),
-    free("attach", "kind"),
-    free("attach", "test"),
-    free("attach", "pixel_mm"),
-    rule("attach", "pose", &[], &[TABLE]),
-    free("attach", "focal_px"),
-    free("attach", "stack"),
-    rule("attach", "voxel_mm", &[], OF_PLAIN_FILE),
-    free("attach", "raw"),
-    free("attach", "voxel_type"),
-    free("attach", "skip_bytes"),
-    free("attach", "big_endian"),
-    rule("attach", "axis", &[], OF_PLAIN_FILE),
+    rule("attach", "unit", FILES, &[]),
+    rule("attach", "kind", FILES, &[]),
+    rule("attach", "test", FILES, &[]),
+    rule("attach", "pixel_mm", FILES, &[]),
+    rule("attach", "pose", FILES, &[TABLE]),
+    rule("attach", "focal_px", &[Given("pose")], &[]),
+    rule("attach", "stack", FILES, &[]),
+    rule("attach", "voxel_mm", FILES, OF_PLAIN_FILE),
+    rule("attach", "raw", FILES, OF_PLAIN_FILE),
+    rule("attach", "voxel_type", &[Given("raw")], &[]),
+    rule("attach", "skip_bytes", &[Given("raw")], &[]),
+    rule("attach", "big_endian", &[Given("raw")], &[]),
+    rule("attach", "axis", FILES, OF_PLAIN_FILE),
     free("attach", "load_test"),
     free("attach", "force_kn"),
     free("attach", "crack"),
@@ -255,7 +256,7 @@ const RULES: &[OptionRule] = &[
     free("predict", "strength"),
     free("predict", "strict"),
     free("predict", "spp"),
-    free("predict", "seed"),
+    rule("predict", "seed", &[], &[Value("spp", "0")]),
     free("predict", "ifc"),
     free("predict", "pdf"),
     free("predict", "out"),

@@ -241,6 +241,7 @@ fn slices(args: &args::Attach, files: &[PathBuf]) -> Result<What, Failure> {
         (of.kind.is_some(), "--kind is of a table"),
         (of.test.is_some(), "--test is of a table"),
         (f.electrode.is_some(), "--electrode is of a --half-cell or of a table"),
+        (args.place.confirmed, "--confirmed is of a finding or of a table"),
         (args.place.height.is_some(), "--height is of a finding; slices have --along"),
         (args.place.instrument.is_some(), "--instrument is of a finding or of a table"),
         (

@@ -13,7 +13,11 @@ use intrados_forecast as forecast;
 use intrados_light::{LitScene, plugin::Lit};
 use intrados_predict::{PredictSettings, Predicting, Prediction, Progress};
 use intrados_report::{Document, Record, RecordError, check_model, pdf};
-use intrados_scene::{Scene, plugin::install, structure::Project};
+use intrados_scene::{
+    Scene,
+    plugin::install,
+    structure::{Date, Project},
+};
 use intrados_stage::{Job, Jobs, Pace};
 
 use super::{info::kind_name, render::MapRows, walks};
@@ -28,6 +32,7 @@ use crate::{
 pub(crate) fn run(session: &Session, args: &args::Predict) -> Result<Outcome, Failure> {
     let mut scene = walks::load(session, &args.scene)?;
     put_on(&mut Arc::make_mut(&mut scene.structure).project, &args.cover);
+    check_inspected(&scene, args.cover.inspected)?;
     if let Some(model) = &args.ifc {
         check_model(model, &scene, &session.job)?;
     }
@@ -92,6 +97,20 @@ fn put_on(project: &mut Project, cover: &args::Cover) {
         }
     }
     project.inspected = inspected.or(project.inspected);
+}
+
+/// Refuses a day of inspection that has not come, and doubts one before what was seen.
+fn check_inspected(scene: &Scene, day: Option<Date>) -> Result<(), Failure> {
+    let Some(day) = day else { return Ok(()) };
+    if day.is_to_come() {
+        return Err(Failure::Usage(format!("--inspected: {}", day.to_come())));
+    }
+    if let Some(last) = scene.structure.dates().pop().filter(|last| *last > day) {
+        tracing::warn!(
+            "--inspected: {day} is before {last}, when something of it was still seen or read: is the day right? all ages count from it"
+        );
+    }
+    Ok(())
 }
 
 /// Share of the progress that reading the evidence takes; the rest is the report's.

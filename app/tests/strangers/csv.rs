@@ -89,6 +89,22 @@ fn tables_as_they_are_written_are_read_doubted_or_refused() {
         ),
         ("-320,-310,-300\n-250,-240,-230\n", Refuses("such as height_m,0.25,0.50")),
         ("height_m,mV\n0.45,-320\n", Reads("0.15  ")),
+        ("height_m,0.25,0.50\n0.5,35,40\n", Refuses("nothing says what the grid holds")),
+        ("height_m,0.25\n0.5,-320\n", Doubts("read as half-cell potentials in mV")),
+        ("along,cover_mm\n0.5,35\n,30\n", Refuses("were its cells merged")),
+        // One odd reading hides none of the others.
+        ("along,cover_mm\n0.5,3.2\n0.6,2.8\n0.7,30\n", Doubts("most covers are no more than 3.2")),
+        ("along,mV\n0.5,320\n0.6,250\n0.7,-310\n", Refuses("2 of 3 of the table")),
+        ("along,mV\n0.5,-320\n0.6,-250\n0.7,310\n", Doubts("310 mV not used")),
+        ("along,mV\n0.5,-320\n0.6,-700\n0.7,-999\n", Doubts("-999 not used")),
+        ("along,cover_mm\n0.5,35\n0.6,180\n0.7,40\n0.8,255\n", Doubts("255 not used")),
+        ("along,carbonation_mm\n0.5,2.5\n0.6,1.5\n0.7,20\n", Doubts("in cm, 25 mm")),
+        (
+            "along,depth_mm,chloride_percent_cement\n0.5,.5,1.1\n0.5,1.5,.6\n0.5,6,.3\n",
+            Doubts("in inches, 152.4 mm"),
+        ),
+        ("along,mV\n0.5,-320\n#2,-400\n", Doubts("begins with # is a remark")),
+        ("# measured in May, 2 of 3\nalong,mV\n# dry\n0.5,-320\n", Reads("-320")),
         ("height_m,0.25,0.50\n0.5,-320,-310\n1.0,-250,-240\n", Reads("-240")),
     ] {
         holds(text.as_bytes(), "table.csv", &[], &outcome);
@@ -105,6 +121,10 @@ fn ordinary_tables_raise_no_doubt() {
     for text in [
         row("cover_mm", &["6", "8"]),
         row("cover_mm", &["35", "120"]),
+        row("cover_mm", &["4", "30", "35"]),
+        row("mV", &["-20", "-99.9", "30"]),
+        row("mV", &["-150", "-255"]),
+        row("velocity_m_s", &["4100", "3999"]),
         row("mV", &["-50", "-120"]),
         row("mV", &["-320", "-600"]),
         row("carbonation_mm", &["0", "2"]),

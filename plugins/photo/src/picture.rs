@@ -254,7 +254,12 @@ fn decode(bytes: &[u8]) -> Result<DynamicImage, PictureError> {
 /// What a strict decoder of JPEG finds wrong in what a lenient one fills in; `None` where nothing
 /// is, or it is no JPEG.
 fn damage(bytes: &[u8]) -> Option<String> {
-    decode::jpeg::markers(bytes)?;
+    if !decode::jpeg::markers(bytes)?.is_fine {
+        return Some(
+            "its JPEG data are damaged (scans of its progression are missing): it is coarser than what was taken; copy it again"
+                .into(),
+        );
+    }
     let options = DecoderOptions::default()
         .set_strict_mode(true)
         .set_max_width(usize::from(u16::MAX))

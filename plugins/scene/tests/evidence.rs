@@ -305,6 +305,82 @@ fn tables_of_every_kind_are_read() {
     );
 }
 
+/// An error has its own unit where its header says one, else that of its value.
+#[test]
+fn an_error_has_its_own_unit() {
+    let first = |fields: &str, text: &str| table(fields, text).observations()[0].shows.clone();
+    let cover = |mm: f64, std_error_mm: f64| Shows::Cover { mm, std_error_mm };
+    for (text, right) in [
+        ("cover [cm],std_error\n3.5,0.2\n", cover(35.0, 2.0)),
+        ("cover [cm],std_error [mm]\n3.5,2\n", cover(35.0, 2.0)),
+        ("cover [mm],std_error [cm]\n35,0.2\n", cover(35.0, 2.0)),
+        ("cover_mm,std_error\n,mm\n35,2\n", cover(35.0, 2.0)),
+    ] {
+        assert_eq!(first("", text), right, "{text}");
+    }
+    let cells = "value,std_error [mV]\n-0.32,15\n";
+    let volts = first("kind: HalfCell, unit: \"V\",", cells);
+    assert!(matches!(volts, Shows::HalfCell { std_error_mv, .. } if std_error_mv == 15.0));
+    let gauge = table("unit: \"ue\",", "gauge,value,std_error [m/m]\nSG1,100,3e-6\n");
+    assert!((gauge.load().unwrap().structure.readings[0].std_error - 3e-6).abs() < 1e-18);
+    let wrong = table("", "cover_mm,std_error [mV]\n35,2\n").problems();
+    assert!(wrong[0].contains("mV is no unit of std_error"), "{wrong:?}");
+}
+
+/// A grid's kind is given, or told by its units, or by values that only potentials have.
+#[test]
+fn a_grid_is_of_its_kind() {
+    let all = |fields: &str, text: &str| -> Vec<Shows> {
+        table(fields, text).observations().into_iter().map(|o| o.shows).collect()
+    };
+    let covers = "height_m,0.25,0.5\n0.5,35,40\n1,30,38\n";
+    let found = all("kind: Cover,", covers);
+    assert_eq!(found.len(), 4);
+    assert_eq!(found[1], Shows::Cover { mm: 40.0, std_error_mm: 4.0 });
+    let wrong = table("", covers).problems();
+    assert!(wrong[0].contains("nothing says what the grid holds"), "{wrong:?}");
+    // Its row of units may say it, m being that of places.
+    let electrode = Electrode::CopperSulphate;
+    let cell = Shows::HalfCell { mv: -320.0, std_error_mv: 15.0, electrode };
+    for text in [
+        "height_m,0.25,0.5,std_error\n0.5,-320,-310,15\n",
+        "height_m,0.25,0.5,std_error\nm,mV,mV,mV\n0.5,-320,-310,15\n",
+        "height_m,0.25 [m],0.5 [m],std_error [mV]\nm,V,V,\n0.5,-0.32,-0.31,15\n",
+    ] {
+        assert_eq!(all("", text)[0], cell, "{text}");
+    }
+    let centimetres = all("kind: Cover,", "height_m,0.25\nm,cm\n0.5,3.5\n");
+    assert_eq!(centimetres, [Shows::Cover { mm: 35.0, std_error_mm: 3.5 }]);
+    for (fields, text, said) in [
+        ("", "height_m,0.25\nm,mm\n0.5,35\n", "nothing says what the grid holds"),
+        ("kind: Cover,", "height_m,0.25\nm,mV\n0.5,35\n", "in mm or cm"),
+        ("", "height_m,0.25,0.5\nm,mV,V\n0.5,-320,-.31\n", "give them one unit"),
+        ("unit: \"V\",", "height_m,0.25\nm,mV\n0.5,-320\n", "correct one of them"),
+    ] {
+        let wrong = table(fields, text).problems();
+        assert!(wrong.iter().any(|line| line.contains(said)), "{text}: {wrong:?}");
+    }
+}
+
+/// A profile is of its place, however its rows stand; a row of no place where others have one is
+/// not taken for the whole member's.
+#[test]
+fn rows_belong_to_their_places() {
+    let by_depth = "along,depth_mm,chloride_percent_cement\n\
+                    0.1,5,1\n0.6,5,0.8\n0.10,15,0.5\n0.60,15,0.4\n";
+    let profiles = table("", by_depth).observations();
+    assert_eq!(profiles.len(), 2);
+    assert!(
+        matches!(&profiles[1].shows, Shows::Chloride { depths_mm, .. } if *depths_mm == [5.0, 15.0])
+    );
+    let merged = "along,cover_mm\n0.1,35\n,30\n";
+    let wrong = table("", merged).problems();
+    assert!(wrong[0].contains("t.csv:3: column along") && wrong[0].contains("merged"), "{wrong:?}");
+    assert_eq!(table("confirmed: true,", merged).observations().len(), 2);
+    // Where nobody says a place, all are the member's.
+    assert_eq!(table("", "along,cover_mm\n,35\n,30\n").observations().len(), 2);
+}
+
 #[test]
 fn gauges_are_read_in_their_units() {
     let text = "gauge;value;std_error\nSG1;41,5;1\n";

@@ -235,6 +235,15 @@ fn of_table(
         return Err(Failure::BadInput(format!("{}: no bridges in it", path.display())));
     }
     let of = args.split.min(rows as u64);
+    let built = table.bridges.iter().filter_map(|bridge| bridge.year);
+    let late = built.filter(|year| *year > args.now).count();
+    if late > 0 {
+        let now = args.now;
+        session.note(format!(
+            "{}: {late} bridges were built after --now {now}: they are taken as new then",
+            path.display()
+        ));
+    }
     let settings = span::Settings { now: args.now, ahead_years: args.ahead };
     plan.network = Some(Network { rows, life: args.life, settings });
     plan.structures.push(Structure { name: "network".into(), path, hash });

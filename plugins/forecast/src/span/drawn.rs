@@ -22,7 +22,7 @@ pub fn drawn(span: &Span, settings: Settings) -> Result<String, &'static str> {
     let bars = (span.steel[0] / one).round().max(2.0);
     // As many thicker or thinner bars as bring the very area.
     let diameter = 1e3 * (span.steel[0] / bars * 4.0 / std::f64::consts::PI).sqrt();
-    let (cover, years) = (1e3 * span.cover[0], settings.now - span.attacked[0]);
+    let (cover, years) = (1e3 * span.cover[0], (settings.now - span.attacked[0]).max(0));
     let [surfacing, traffic] = [span.surfacing, span.traffic].map(|q| 1e-3 * q);
     let (length, class) = (span.length, span.class);
     Ok(format!(

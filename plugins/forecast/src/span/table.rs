@@ -46,6 +46,11 @@ const LONGITUDE: &[&str] = &["LONGITUDE", "LONGITUDE [DEG]"];
 const YEAR: &[&str] = &["YEAR BUILT", "YEAR"];
 const REHABILITATED: &[&str] = &["LAST MAJOR REHAB", "REHABILITATED"];
 const SPANS: &[&str] = &["SPAN DETAILS", "SPANS [M]", "SPANS [FT]"];
+/// Words that stand in place of a number where a spreadsheet adds up.
+const TOTALS: [&str; 9] =
+    ["total", "totals", "sum", "sum:", "total:", "summe", "gesamt", "mean", "average"];
+/// Spans of one bridge beyond which they are doubted.
+const MANY_SPANS: usize = 200;
 /// One foot, m.
 const FOOT: f64 = 0.3048;
 /// Years that registers write where they know none.
@@ -93,6 +98,7 @@ pub fn parse(bytes: &[u8]) -> Result<BridgeTable, TableError> {
         .from_reader(text.as_bytes());
     let heads = reader.headers().map_err(|e| TableError(format!("is no table: {e}")))?.clone();
     let columns = Columns::named(&heads)?;
+    doubts.of_all.extend(columns.not_read(&heads));
     let mut records = Vec::new();
     for (k, record) in reader.records().enumerate() {
         let at = |why: String| TableError(format!("row {}: {why}", k + 2));
@@ -117,10 +123,20 @@ pub fn parse(bytes: &[u8]) -> Result<BridgeTable, TableError> {
     for (row, record) in &records {
         let at = |why: String| TableError(format!("row {row}: {why}"));
         let mut bridge = columns.bridge(record, mark, &mut doubts).map_err(at)?;
+        if TOTALS.contains(&bridge.id.to_lowercase().as_str()) {
+            doubts.add(
+                &bridge.id,
+                "is the name of a sum, no bridge: its row was not used",
+                &bridge.id,
+            );
+            continue;
+        }
         // Two rows of one number are two structures to whoever keeps the table.
         let times = known.entry(bridge.id.clone()).or_default();
         *times += 1;
         if *times > 1 {
+            let shown = format!("row {row}");
+            doubts.add(&bridge.id, "has its number again: it was taken for another bridge", &shown);
             bridge.id = format!("{} #{times}", bridge.id);
         }
         bridges.push(bridge);
@@ -239,6 +255,27 @@ impl Columns {
         })
     }
 
+    /// Which columns say nothing to us.
+    fn not_read(&self, heads: &StringRecord) -> Option<String> {
+        let known = [
+            [Some(self.id), Some(self.year), Some(self.spans), self.name],
+            [self.road, self.place[0], self.place[1], self.rehabilitated],
+        ];
+        let is_known = |at: usize| known.iter().flatten().any(|column| *column == Some(at));
+        let strange: Vec<&str> = heads
+            .iter()
+            .enumerate()
+            .filter(|(at, head)| !head.is_empty() && !is_known(*at))
+            .map(|(_, head)| head)
+            .collect();
+        let (first, n) = (strange.first()?, strange.len());
+        let more = if n > 1 { format!(" and {} more", n - 1) } else { String::new() };
+        Some(format!(
+            "the column \"{}\"{more} is not known here: its cells are not read",
+            short(first)
+        ))
+    }
+
     /// The decimal mark of the table: as its places and its spans show; a point where nothing does.
     fn mark(&self, records: &[(usize, StringRecord)]) -> DecimalMark {
         let mut style = NumberStyle::default();
@@ -286,6 +323,10 @@ impl Columns {
         let spans = spans(cell(self.spans), mark)?;
         if spans.is_empty() {
             doubts.add(&id, "spans: nothing is computed of it", "no");
+        }
+        if spans.len() > MANY_SPANS {
+            let shown = spans.len().to_string();
+            doubts.add(&id, "spans are more than any but a few bridges have: is it one?", &shown);
         }
         let metres = if self.in_feet == Some(true) { FOOT } else { 1.0 };
         Ok(Bridge {
@@ -424,6 +465,12 @@ mod tests {
         assert_eq!(bridges[0].name, "Over the creek");
         assert_eq!((bridges[1].year, &bridges[1].spans[..]), (None, &[7.5][..]));
         assert_eq!(bridges[2].id, "2 #2");
+        let table = "ID,OWNER,YEAR,SPANS [m]\n1,we,1965,12\nTotal,,,12\n1,we,1970,14\n";
+        let read = parse(table.as_bytes()).unwrap();
+        assert_eq!(read.bridges.iter().map(|b| b.id.as_str()).collect::<Vec<_>>(), ["1", "1 #2"]);
+        for said in ["\"OWNER\" is not known", "name of a sum", "row 4 has its number again"] {
+            assert!(read.doubts.iter().any(|d| d.contains(said)), "{said} {:?}", read.doubts);
+        }
     }
 
     /// What no bridge has is refused, and the line says in which row and what to do.

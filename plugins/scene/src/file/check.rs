@@ -415,8 +415,11 @@ impl Checker<'_> {
 
     /// A cover is a page.
     fn project(&mut self, project: &crate::structure::Project) {
-        let crate::structure::Project { structure, place, owner, inspector, inspected: _, purpose } =
+        let crate::structure::Project { structure, place, owner, inspector, inspected, purpose } =
             project;
+        if let Some(day) = inspected.filter(|day| day.is_to_come()) {
+            self.error("inspected", "FUTURE", day.to_come());
+        }
         let fields = [
             ("structure", structure),
             ("place", place),

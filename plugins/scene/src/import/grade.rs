@@ -105,9 +105,24 @@ pub(super) fn composition(element: &Element) -> Composition {
     }
     let names = || element.words.iter().chain([&element.name]);
     let by_name = || names().find_map(|name| strength::pair(&name.to_uppercase()));
+    let has_concrete = concrete.is_some();
     let reading = concrete.or_else(|| by_name().filter(|r| !r.is_doubtful));
+    // A grid's axes may be called so, too.
+    let is_mark = |name: &str| name.trim().chars().all(|c| "cC/0123456789".contains(c));
+    if let Some(by_mark) = reading.as_ref().filter(|_| !has_concrete && is_mark(&element.name)) {
+        let class = words(&by_mark.concrete);
+        let mark = &element.name;
+        found
+            .doubts
+            .push(format!("its name, {mark}, is taken for its class, {class}: it may be its mark"));
+    }
     if is_concrete || reading.is_some() {
         found.unknown.clear();
+    } else if others.is_empty() && found.unknown.is_empty() {
+        let rolled = names().find(|name| matter::is_rolled_steel(name));
+        found
+            .unknown
+            .extend(rolled.map(|name| format!("none, but a name of rolled steel, {name}")));
     }
     if let Some(light) = reading.as_ref().filter(|r| r.is_lightweight) {
         let fck = match &light.concrete {
@@ -473,6 +488,25 @@ mod tests {
         let mut element = Element::default();
         element.properties.entry(set.into()).or_default().insert(name.into(), value);
         element
+    }
+
+    /// A name alone is believed with a doubt, and that of a rolled section makes no concrete.
+    #[test]
+    fn a_name_alone_is_doubted() {
+        let named = |name: &str| Element { name: name.into(), ..Element::default() };
+        for (name, doubts, unknown) in [
+            ("C12/15", 1, 0),
+            ("Column C30/37", 0, 0),
+            ("Column 4", 0, 0),
+            ("HEA 300", 0, 1),
+            ("Beam IPE400:12345", 0, 1),
+            ("W14X90", 0, 1),
+            ("UB 4", 0, 0),
+            ("S355 girder", 0, 1),
+        ] {
+            let found = composition(&named(name));
+            assert_eq!((found.doubts.len(), found.unknown.len()), (doubts, unknown), "{name}");
+        }
     }
 
     #[test]

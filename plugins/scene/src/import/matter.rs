@@ -437,6 +437,25 @@ fn steel_grade(name: &str) -> Option<f32> {
     })
 }
 
+/// Whether a name is that of a rolled section, as `HEA 300` or `W14X90`, or says a steel's grade.
+pub(super) fn is_rolled_steel(name: &str) -> bool {
+    const SERIES: [&str; 16] = [
+        "HEA", "HEB", "HEM", "HD", "HL", "HP", "IPE", "IPN", "INP", "UPN", "UPE", "UNP", "UB",
+        "UC", "RHS", "SHS",
+    ];
+    // The least of a series is 80 mm high, or 100 by its name.
+    let of_series = |token: &String| {
+        SERIES.iter().any(|series| after(token, series).is_some_and(|(mm, _)| mm >= 80))
+            || after(token, "W").is_some_and(|(inch, rest)| {
+                (4..=44).contains(&inch)
+                    && after(rest, "X").is_some_and(|(_, rest)| rest.is_empty())
+            })
+    };
+    let has_yield =
+        |token: &String| after(token, "S").is_some_and(|(mpa, _)| YIELDS.contains(&mpa));
+    tokens(name).iter().any(|token| has_yield(token) || of_series(token))
+}
+
 /// Bending strength, MPa, and modulus, GPa, of timber by a class in its name: `C24`, `GL28h`,
 /// `D30`. Alone, without a word of wood, only what can be nothing else.
 fn timber_class(name: &str, is_timber: bool) -> Option<(f32, f32)> {

@@ -64,8 +64,18 @@ impl Date {
     }
 
     /// Whether nobody can have measured then yet: it is after today everywhere on earth.
-    pub(crate) fn is_to_come(self) -> bool {
+    #[must_use]
+    pub fn is_to_come(self) -> bool {
         self > Self::today().plus_days(1)
+    }
+
+    /// What is said of a day that [`Date::is_to_come`].
+    #[must_use]
+    pub fn to_come(self) -> String {
+        format!(
+            "{self} is a day to come (today is {}): is the year right? correct it",
+            Self::today()
+        )
     }
 
     /// Days since the first of January 1970. The year is taken to begin in March, so that the day

@@ -25,6 +25,12 @@ const SAME: f64 = 0.3;
 const FEW_VIEWS: f64 = 0.1;
 /// A bin is dead if it varies by less than this share of what its neighbours vary.
 const DEAD: f64 = 1e-3;
+/// By so much of the middle one the masses of nine tenths of all views may differ: what is noise and
+/// hardening of the beam; and a single view's, before it is taken for dead.
+const UNEVEN: f64 = 0.25;
+const LOST: f64 = 0.5;
+/// Share of the most beyond which rays beside the specimen have something.
+const BESIDE: f64 = 0.05;
 
 /// Why values are no line integrals; `None` where they may be.
 #[must_use]
@@ -44,6 +50,13 @@ pub fn no_integrals(sinogram: &Sinogram) -> Option<String> {
             beside[0].min(beside[1])
         ));
     }
+    // Through the specimen far below what is beside it: as many as are attenuated have a sign lost.
+    let most = beside[0].abs().max(beside[1].abs());
+    if within < 0.0 && within < -10.0 * most {
+        return Some(format!(
+            "its rays through the specimen have less than nothing ({within:.4}): the sign is turned; give −ln(I/I₀), not ln(I/I₀)"
+        ));
+    }
     None
 }
 
@@ -61,11 +74,79 @@ pub fn sinogram_doubts(sinogram: &Sinogram, is_arc_given: bool) -> Vec<String> {
     }
     if orbit.beam == Beam::Parallel {
         let middle = sinogram.row(orbit.rows() / 2);
+        let mass = mass_doubt(&middle, bins);
+        let is_uneven = mass.is_some();
+        doubts.extend(mass.or_else(|| beside_doubt(&middle, bins)));
+        if is_uneven {
+            return doubts;
+        }
         // By another arc than the true one the axis would seem off, too.
         let arc = if is_arc_given { None } else { arc_doubt(&middle, orbit) };
         doubts.extend(arc.or_else(|| axis_doubt(&middle, orbit)));
     }
     doubts
+}
+
+/// Views whose mass is another than that of others: of one section all have the same (Helgason and
+/// Ludwig, order 0).
+fn mass_doubt(row: &[f32], bins: usize) -> Option<String> {
+    let masses: Vec<f32> = row.chunks(bins).map(|line| line.iter().sum()).collect();
+    let mut sorted = masses.clone();
+    sorted.sort_unstable_by(f32::total_cmp);
+    let at = |share: f64| sorted.get((share * (sorted.len() - 1) as f64) as usize).copied();
+    let [low, middle, high] = [at(0.05)?, at(0.5)?, at(0.95)?].map(f64::from);
+    if middle <= 0.0 {
+        return None;
+    }
+    if high - low > UNEVEN * middle {
+        return Some(format!(
+            "the sums of its views run from {:.0} to {:.0} % of the middle one, and all views of one section have the same: are its views in columns (turn it round), or is the specimen cut off?",
+            100.0 * low / middle,
+            100.0 * high / middle
+        ));
+    }
+    let off = |mass: f32| (f64::from(mass) - middle).abs() > LOST * middle;
+    let lost: Vec<usize> = (0..masses.len()).filter(|v| off(masses[*v])).collect();
+    let (first, n) = (lost.first()?, lost.len());
+    let them = if n == 1 { "it" } else { "them" };
+    let more = if n == 1 { String::new() } else { format!(" and {} more", n - 1) };
+    Some(format!(
+        "view {first}{more} (from 0) has {:.0} % of the mass of others: it was not taken, or twice; leave {them} out",
+        100.0 * f64::from(masses[*first]) / middle
+    ))
+}
+
+/// Rays beside the specimen that have something, or less than nothing.
+fn beside_doubt(row: &[f32], bins: usize) -> Option<String> {
+    let edge = (bins / 40).max(1);
+    let most = row.iter().copied().fold(0.0_f32, f32::max);
+    let ends = |line: &[f32]| -> [f32; 2] {
+        [&line[..edge], &line[bins - edge..]].map(|end| median(&mut end.to_vec()))
+    };
+    // A stump of the specimen may reach over one edge.
+    let clearer = |line: &[f32]| {
+        let [a, b] = ends(line);
+        if a.abs() < b.abs() { a } else { b }
+    };
+    let mut beside: Vec<f32> = row.chunks(bins).map(clearer).collect();
+    beside.sort_unstable_by(f32::total_cmp);
+    let at = |share: f64| beside.get((share * (beside.len() - 1) as f64) as usize).copied();
+    let [low, middle, high] = [at(0.05)?, at(0.5)?, at(0.95)?];
+    let limit = BESIDE as f32 * most;
+    if middle.abs() <= limit {
+        return None;
+    }
+    Some(match (middle < 0.0, high - low < 0.2 * middle.abs()) {
+        (true, _) => format!(
+            "its rays beside the specimen have less than nothing ({middle:.4}): a mean was taken away; its slices lack as much attenuation"
+        ),
+        (false, true) => format!(
+            "its rays beside the specimen have {middle:.4} in every view: an offset was added, or something that fills the picture is around it; its slices show as much attenuation more"
+        ),
+        (false, false) => format!(
+            "its rays at both edges still have {middle:.4} of up to {most:.4}: the specimen reaches over the detector, or the sinogram was cropped; its slices are brighter towards their edge"
+        ),
+    })
 }
 
 fn size_doubt(sinogram: &Sinogram) -> Option<String> {
@@ -235,6 +316,36 @@ mod tests {
             let doubts = sinogram_doubts(&sinogram, false);
             assert!(doubts.len() == 1 && doubts[0].contains(said), "{doubts:?}");
         }
+        // What was done to it, turned one by one.
+        let with = |change: fn(&mut Vec<f32>)| {
+            let mut sinogram = plain.clone();
+            change(&mut sinogram.data);
+            sinogram_doubts(&sinogram, false)
+        };
+        for (change, said) in [
+            ((|d| d.iter_mut().for_each(|v| *v += 1.0)) as fn(&mut Vec<f32>), "offset"),
+            (|d| d.iter_mut().for_each(|v| *v -= 1.0), "less than nothing"),
+            (|d| d[20 * 64..21 * 64].fill(0.0), "view 20 (from 0) has 0 %"),
+            (|d| d[20 * 64..22 * 64].iter_mut().for_each(|v| *v *= 2.0), "view 20 and 1 more"),
+        ] {
+            let doubts = with(change);
+            assert!(doubts.len() == 1 && doubts[0].contains(said), "{said}: {doubts:?}");
+        }
+        assert_eq!(with(|d| d.iter_mut().for_each(|v| *v += 0.01)), Vec::<String>::new());
+        let turned = Sinogram {
+            data: (0..90 * 64).map(|i| plain.data[(i % 90) * 64 + i / 90]).collect(),
+            orbit: Orbit::circle(Beam::Parallel, 64, PI, [1, 90], [1e-3; 2]),
+        };
+        let doubts = sinogram_doubts(&turned, false);
+        assert!(doubts.len() == 1 && doubts[0].contains("in columns"), "{doubts:?}");
+        let cropped = Sinogram {
+            data: plain.data.chunks(64).flat_map(|line| line[20..44].to_vec()).collect(),
+            orbit: Orbit::circle(Beam::Parallel, 90, PI, [1, 24], [1e-3; 2]),
+        };
+        let doubts = sinogram_doubts(&cropped, false);
+        assert!(doubts.len() == 1 && doubts[0].contains("over the detector"), "{doubts:?}");
+        let negative = Sinogram { data: plain.data.iter().map(|v| -v).collect(), ..plain.clone() };
+        assert!(no_integrals(&negative).unwrap().contains("sign is turned"));
         let scaled = |by: f32| {
             let data = plain.data.iter().map(|v| v * by).collect();
             sinogram_doubts(&Sinogram { data, ..plain.clone() }, false).len()

@@ -15,7 +15,7 @@ use std::{
 
 use dicom_object::{DefaultDicomObject, InMemDicomObject, OpenFileOptions, Tag};
 use dicom_pixeldata::{ConvertOptions, ModalityLutOption, PixelDecoder};
-use intrados_stage::decode::guarded;
+use intrados_stage::decode::{DecodeLimits, PictureSize, guarded};
 use layout::PixelLayout;
 
 use super::{
@@ -59,6 +59,9 @@ const TRANSFORMATION: Tag = Tag(0x0028, 0x9145);
 const SHARED: Tag = Tag(0x5200, 0x9229);
 const PER_FRAME: Tag = Tag(0x5200, 0x9230);
 const PIXELS: Tag = Tag(0x7FE0, 0x0010);
+
+/// Most pixels of a frame that is packed: a detector of 6000 by 6000.
+const MOST_PACKED: u64 = 36_000_000;
 
 /// A series whose headers have been checked.
 pub(super) struct Series {
@@ -257,6 +260,17 @@ fn header(path: &Path) -> Result<Header, VolumeError> {
     }
     let stored = Stored::of(&object, whole(REPRESENTATION) == Some(1));
     stored.check(layout, [columns, rows, count as usize]).map_err(bad)?;
+    if layout == PixelLayout::Packed {
+        // Unpacked, a frame is held in numbers of eight bytes, three times over.
+        let size = PictureSize {
+            width: columns as u64,
+            height: rows as u64,
+            pixel_bytes: u64::from(stored.bits[0]).div_ceil(8),
+            file_bytes: open_plain(path)?.1,
+        };
+        let limits = DecodeLimits { side: MAX_SIDE as u64, pixels: MOST_PACKED };
+        size.check(&limits).map_err(|why| bad(why.to_string()))?;
+    }
     let shared = items(&object, SHARED).first();
     let own = |frame: usize| items(&object, PER_FRAME).get(frame);
     let parts = |frame: usize| [own(frame), shared, Some(&*object)];
@@ -350,6 +364,11 @@ impl Stored {
         }
         let PixelLayout::Plain { bytes, .. } = layout else { return Ok(()) };
         let need = [x, y, z, allocated as usize / 8].iter().map(|n| *n as u64).product::<u64>();
+        if let Some(frames) = bytes.checked_div(need / z.max(1) as u64).filter(|n| *n > z as u64) {
+            return Err(format!(
+                "holds pixels of {frames} slices, and its header says {z}: correct NumberOfFrames, or the size of a pixel"
+            ));
+        }
         if bytes < need {
             return Err(format!(
                 "holds {bytes} bytes of pixels and needs {need} for {}: it is damaged or cut short",

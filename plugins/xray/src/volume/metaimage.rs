@@ -19,6 +19,9 @@ use super::{
 /// Longest header: some lines, or one for each slice of a list.
 const MAX_HEADER: u64 = 4 << 20;
 
+/// Bytes behind the voxels that say nothing: what fills a word, or ends a line.
+const PADDING: u64 = 16;
+
 /// Types of a voxel value, as MetaIO calls and sizes them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Element {
@@ -101,6 +104,10 @@ pub(super) struct Raw {
     skip: Vec<u64>,
     element: Element,
     msb: bool,
+    /// What a value stands for: slope and offset of its stored one.
+    intensity: [f32; 2],
+    /// Bytes that the header does not account for, for people.
+    pub(super) surplus: Option<String>,
 }
 
 /// What the lines of a header say.
@@ -111,6 +118,7 @@ struct Header {
     offset: Vec<f64>,
     unit: f64,
     element: Option<Element>,
+    intensity: [f32; 2],
     msb: bool,
     skip: i64,
     data: String,
@@ -197,6 +205,7 @@ fn locate(
     let slices = if files.len() > 1 { 1 } else { size[2] };
     let need = (size[0] * size[1] * slices) as u64 * element.bytes() as u64;
     let mut skip = Vec::with_capacity(files.len());
+    let mut surplus = None;
     for file in &files {
         let length =
             if local { open_plain(file)?.1 } else { not_empty(file, access.open(folder, file))?.1 };
@@ -214,13 +223,22 @@ fn locate(
             );
             return Err(VolumeError::bad(file, reason));
         }
+        let more = length - start - need;
+        if more > PADDING {
+            surplus.get_or_insert(format!(
+                "{} has {more} bytes more than {} voxels of {} bytes after {start}: DimSize or ElementType may be wrong, or HeaderSize missing, where others stand before the voxels",
+                file.display(),
+                by([size[0], size[1], slices]),
+                element.bytes()
+            ));
+        }
         skip.push(start);
     }
-    Ok(Raw { files, skip, element, msb: header.msb })
+    Ok(Raw { files, skip, element, msb: header.msb, intensity: header.intensity, surplus })
 }
 
 fn parse(bytes: &[u8]) -> Result<Header, String> {
-    let mut header = Header { unit: 1e-3, ..Header::default() };
+    let mut header = Header { unit: 1e-3, intensity: [1.0, 0.0], ..Header::default() };
     let mut rest = bytes;
     for line in 1.. {
         let Some(end) = rest
@@ -297,6 +315,8 @@ fn entry(header: &mut Header, key: &str, value: &str) -> Result<(), String> {
                     .ok_or_else(|| format!("ElementType is {value}; {known} are read"))?,
             );
         }
+        "ElementToIntensityFunctionSlope" => header.intensity[0] = finite(key, value)?,
+        "ElementToIntensityFunctionOffset" => header.intensity[1] = finite(key, value)?,
         "ElementByteOrderMSB" | "BinaryDataByteOrderMSB" => header.msb = yes(value),
         "ElementNumberOfChannels" if value != "1" => {
             return Err(format!("voxels have {value} channels; one is read"));
@@ -322,6 +342,14 @@ fn entry(header: &mut Header, key: &str, value: &str) -> Result<(), String> {
     Ok(())
 }
 
+fn finite(key: &str, value: &str) -> Result<f32, String> {
+    let number = value
+        .parse()
+        .ok()
+        .filter(|v: &f32| v.is_finite() && (key.ends_with("Offset") || *v != 0.0));
+    number.ok_or_else(|| format!("{key} is {value}; it is a number, and a slope is not 0"))
+}
+
 fn numbers<T: std::str::FromStr>(value: &str, most: usize) -> Result<Vec<T>, String> {
     let words: Vec<&str> = value.split_whitespace().collect();
     if words.len() > most {
@@ -336,7 +364,8 @@ fn numbers<T: std::str::FromStr>(value: &str, most: usize) -> Result<Vec<T>, Str
 impl Raw {
     /// Slices that follow each other in one file, from the byte `skip` on.
     pub(super) fn in_one(path: &Path, skip: u64, element: Element, msb: bool) -> Self {
-        Self { files: vec![path.to_owned()], skip: vec![skip], element, msb }
+        let (files, intensity) = (vec![path.to_owned()], [1.0, 0.0]);
+        Self { files, skip: vec![skip], element, msb, intensity, surplus: None }
     }
 
     /// Values of slice `z`.
@@ -354,6 +383,8 @@ impl Raw {
         file.read_exact(&mut raw).map_err(VolumeError::missing(path))?;
         let mut out = Vec::with_capacity(pixels);
         self.element.decode(&raw, self.msb, &mut out);
+        let [slope, offset] = self.intensity;
+        out.iter_mut().for_each(|v| *v = slope.mul_add(*v, offset));
         match out.iter().position(|v| !v.is_finite()) {
             None => Ok(out),
             Some(i) => {

@@ -82,8 +82,9 @@ impl Reader {
                 let told = Grid::centred(grid.size, known_voxel(path, voxel, None)?);
                 grid = Grid { voxel: told.voxel, ..grid };
             }
+            let doubts = raw.surplus.iter().cloned().collect();
             let (source, path) = (Source::Raw(raw), path.to_owned());
-            return Ok(Self { source, grid, path, told: pixel, doubts: Vec::new() });
+            return Ok(Self { source, grid, path, told: pixel, doubts });
         }
         match picture::open(path)? {
             (Picture::Png, _) => Self::files(vec![path.to_owned()], voxel),

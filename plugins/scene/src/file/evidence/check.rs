@@ -60,12 +60,9 @@ pub(super) fn check_seat(seat: &Seat) -> Vec<Problem> {
     c.problems
 }
 
-/// Why what was measured on a day to come does not count.
+/// Why what was measured on a day to come does not count, unless it is confirmed.
 pub(super) fn to_come(date: Date) -> String {
-    format!(
-        "{date} is a day to come (today is {}): is the year right? correct it, or confirm it (confirmed: true, attach --confirmed)",
-        Date::today()
-    )
+    format!("{}, or confirm it (confirmed: true, attach --confirmed)", date.to_come())
 }
 
 impl Checker<'_> {
@@ -87,7 +84,7 @@ impl Checker<'_> {
         {
             self.text(field, text);
         }
-        self.date(*date);
+        self.past(*date);
         for (field, value, low, high) in [
             ("focal_px", focal_px, 10.0, 1e6),
             ("picking_px", picking_px, 0.01, 100.0),
@@ -102,6 +99,13 @@ impl Checker<'_> {
     fn date(&mut self, date: Option<Date>) {
         if let Some(date) = date.filter(|d| d.is_to_come()) {
             self.error("date", "FUTURE", to_come(date));
+        }
+    }
+
+    /// A day that nobody can confirm before it has come.
+    pub(crate) fn past(&mut self, date: Option<Date>) {
+        if let Some(date) = date.filter(|d| d.is_to_come()) {
+            self.error("date", "FUTURE", date.to_come());
         }
     }
 
@@ -307,7 +311,10 @@ impl Checker<'_> {
             self.error("slices", "EMPTY", "names no slices: give Files(…)");
         }
         self.each("slices", &m.slices, |c, slices| match slices {
-            Slices::Files { .. } | Slices::Stack { .. } => c.slices(slices),
+            Slices::Files { .. } | Slices::Stack { .. } => {
+                c.slices(slices);
+                c.past(slices.drilled().date);
+            }
             Slices::Drawn { .. } | Slices::Scanned { .. } => {
                 let message = "is no evidence: slices that are drawn or scanned from the planted \
                                truth belong into the scene; name the files of real ones";

@@ -1,7 +1,7 @@
 //! Where the parts of a table's text are: what stands above its header, the header, rows of units
 //! below it. What is no row is blanked, so that lines keep their numbers.
 
-use intrados_stage::sheet;
+use intrados_stage::sheet::{self, DecimalMark};
 
 use super::table::{is_deciding, is_known};
 use crate::problem::Problem;
@@ -42,8 +42,11 @@ pub(super) fn lay_out(file: &str, bytes: &[u8]) -> Result<Layout, Problem> {
             *first = "";
         }
     }
+    let comments: Vec<(usize, &str)> =
+        lines.iter().copied().enumerate().filter(|(_, line)| line.starts_with('#')).collect();
     lines.iter_mut().filter(|line| line.starts_with('#')).for_each(|line| *line = "");
     let (header, separator) = find_header(&lines, named);
+    notes.extend(rows_behind_marks(file, &comments, header, separator));
     let above = lines.iter().take(header).filter(|line| !line.trim().is_empty()).count();
     if above > 0 {
         let of =
@@ -55,6 +58,37 @@ pub(super) fn lay_out(file: &str, bytes: &[u8]) -> Result<Layout, Problem> {
     let mut text = lines.join("\n");
     text.push('\n');
     Ok(Layout { text, header: header + 1, separator, units, notes })
+}
+
+/// Says how many lines below the header are no rows since they begin with #, and could be some:
+/// they have numbers behind what parts cells.
+fn rows_behind_marks(
+    file: &str,
+    comments: &[(usize, &str)],
+    header: usize,
+    separator: u8,
+) -> Option<String> {
+    let has_numbers = |line: &str| {
+        cells(line, separator).iter().skip(1).any(|cell| {
+            [DecimalMark::Point, DecimalMark::Comma]
+                .into_iter()
+                .any(|mark| sheet::number(cell, mark).is_some())
+        })
+    };
+    let below = comments.iter().filter(|(line, text)| *line > header && has_numbers(text));
+    let found: Vec<&(usize, &str)> = below.collect();
+    let (line, text) = found.first()?;
+    let text = crate::file::shorten(text);
+    Some(match found.len() {
+        1 => format!(
+            "{file}:{}: {text} was not read: a line that begins with # is a remark",
+            line + 1
+        ),
+        n => format!(
+            "{file}: {n} lines were not read, the first line {}, {text}: what begins with # is a remark",
+            line + 1
+        ),
+    })
 }
 
 /// Cells of one line.

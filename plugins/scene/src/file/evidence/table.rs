@@ -1,5 +1,7 @@
 //! Tables of observations and readings: CSV as spreadsheets and instruments write it.
 
+use std::collections::HashMap;
+
 use csv::{ReaderBuilder, StringRecord};
 use glam::Vec3;
 use intrados_stage::sheet::{self, DecimalMark, NumberStyle, StyleVerdict};
@@ -18,8 +20,10 @@ use crate::{
 };
 
 mod doubt;
+mod grid;
 
 pub(super) use doubt::{doubt_covers, doubt_profile};
+use grid::place_across;
 
 /// Most rows of a table.
 const MAX_ROWS: usize = 200_000;
@@ -323,7 +327,7 @@ pub(crate) fn read(file: &str, bytes: &[u8], survey: &Survey) -> Result<Rows, Ve
     let mut notes = table.all_notes(&layout);
     notes.extend(doubt::leave_out(&table, &mut rows).map_err(one)?);
     let mut out = Rows { notes, ..Rows::default() };
-    let mut problems = Vec::new();
+    let mut problems: Vec<Problem> = doubt::place_lost(&table, &rows).into_iter().collect();
     table.take_rows(&rows, &mut out, &mut problems);
     if problems.is_empty() {
         problems.extend(doubt::sign_lost(&table, &out));
@@ -332,6 +336,8 @@ pub(crate) fn read(file: &str, bytes: &[u8], survey: &Survey) -> Result<Rows, Ve
         problems.truncate(MAX_PROBLEMS);
         return Err(problems);
     }
+    let unsigned = doubt::leave_out_unsigned(&table, &mut out);
+    out.notes.extend(unsigned);
     for record in &out.records {
         problems.extend(check_record(&record.what).into_iter().map(|problem| Problem {
             place: record.field(table.column_of(&problem.place)),
@@ -410,6 +416,8 @@ struct Table<'a> {
     channels: Vec<Channel>,
     /// The unit that a header gives to `value`.
     value_unit: Option<String>,
+    /// The unit that a header gives to `std_error`.
+    error_unit: Option<String>,
     days: Option<DayOrder>,
     header: usize,
     separator: u8,
@@ -440,6 +448,7 @@ impl<'a> Table<'a> {
             strange: Vec::new(),
             channels: Vec::new(),
             value_unit: None,
+            error_unit: None,
             days: None,
             header: layout.header,
             separator: layout.separator,
@@ -447,7 +456,8 @@ impl<'a> Table<'a> {
             notes: Vec::new(),
         };
         table.header(layout)?;
-        table.holds = table.told()?;
+        table.holds = table.told(layout)?;
+        table.check_error_unit()?;
         Ok(table)
     }
 
@@ -527,8 +537,13 @@ impl<'a> Table<'a> {
 
     /// What makes a column's numbers those of its name.
     fn scale(&mut self, column: Column, unit: &str) -> Result<[f64; 2], Problem> {
-        if column == Column::Value {
-            self.value_unit = Some(unit.to_owned()).filter(|u| !u.trim_matches('-').is_empty());
+        let named = || Some(unit.to_owned()).filter(|u| !u.trim_matches('-').is_empty());
+        match column {
+            Column::Value => self.value_unit = named(),
+            Column::StdError => self.error_unit = named(),
+            _ => {}
+        }
+        if matches!(column, Column::Value | Column::StdError) {
             return Ok([1.0, 0.0]);
         }
         let scale = scale_of(column, unit).ok_or_else(|| {
@@ -590,7 +605,10 @@ impl<'a> Table<'a> {
     }
 
     /// What the columns say that the table holds.
-    fn told(&mut self) -> Result<Holds, Problem> {
+    fn told(&mut self, layout: &Layout) -> Result<Holds, Problem> {
+        if self.is_grid() {
+            return self.of_grid(layout);
+        }
         if !self.channels.is_empty() {
             return self.of_channels();
         }
@@ -668,6 +686,30 @@ impl<'a> Table<'a> {
         };
         let stray = known().find(is_stray)?;
         Some(format!("the column {} {why}: take it out", stray.name()))
+    }
+
+    /// What makes a standard error in a unit that of [`Finding`]; `None`: it is none of what the
+    /// table holds.
+    fn error_scale(&self, named: &str) -> Option<f64> {
+        let kind = match self.holds {
+            Holds::One { kind, .. } | Holds::Grid { kind } => kind,
+            Holds::Profiles { .. } => return (named == "%").then_some(1.0),
+            Holds::Gauges | Holds::Channels => return GaugeUnit::named(named).map(GaugeUnit::si),
+        };
+        scale_of(Column::Of(kind), named).map(|scale| scale[0])
+    }
+
+    fn check_error_unit(&self) -> Result<(), Problem> {
+        match self.error_unit.as_deref().filter(|unit| self.error_scale(unit).is_none()) {
+            Some(unit) => {
+                let message = format!(
+                    "{} is no unit of std_error here: give it in that of what was measured",
+                    shorten(unit)
+                );
+                Err(self.in_header("UNIT", message))
+            }
+            None => Ok(()),
+        }
     }
 
     /// What is said of the table beside its file and does not fit what it holds.
@@ -838,6 +880,7 @@ impl<'a> Table<'a> {
     ) -> Result<DecimalMark, Problem> {
         let name = self.columns.get(index).copied().flatten().map_or("value", Column::name);
         let place = format!("{}: column {name}", self.file);
+        let mut why = "as other cells show";
         let mark = match style.verdict(all) {
             StyleVerdict::Certain(mark) => mark,
             StyleVerdict::Mixed => {
@@ -846,7 +889,10 @@ impl<'a> Table<'a> {
             }
             StyleVerdict::Open if !style.is_open() => return Ok(DecimalMark::Point),
             StyleVerdict::Open => match self.likely_mark(index, cells) {
-                Some(mark) => mark,
+                Some(mark) => {
+                    why = "for else no value would be one of its kind";
+                    mark
+                }
                 None => {
                     let first =
                         shorten(cells.iter().find(|c| c.contains(['.', ','])).unwrap_or(&""));
@@ -864,7 +910,7 @@ impl<'a> Table<'a> {
             let value = sheet::number(cell, mark).map_or(0.0, |n| n.value);
             let cell = shorten(cell);
             self.notes.push(format!(
-                "{file}: the mark in {cell} of the column {name} parts thousands, as other cells show: read as {value}"
+                "{file}: the mark in {cell} of the column {name} parts thousands, {why}: read as {value}"
             ));
         } else if style.seems_parted(mark)
             && let Some((cell, number)) = parted
@@ -913,7 +959,7 @@ impl<'a> Table<'a> {
                 for (n, row) in rows.iter().enumerate() {
                     let found = row.number(column).and_then(|value| {
                         let factor = row.factor(kind, column)?;
-                        let error = row.std_error(column)?.map(|e| e * factor);
+                        let error = row.std_error(column, factor)?;
                         let finding = finding(kind, value * factor, error, survey);
                         self.record(row, format!("{} {}", survey.name, n + 1), finding)
                     });
@@ -921,8 +967,7 @@ impl<'a> Table<'a> {
                 }
             }
             Holds::Profiles { column } => {
-                let profiles = rows.chunk_by(Row::same_place);
-                for (n, profile) in profiles.enumerate() {
+                for (n, profile) in by_place(rows).iter().enumerate() {
                     // The table has its own name already, however few profiles there are.
                     let name = format!("{} {}", survey.name, n + 1);
                     take(self.profile(profile, name, column), &mut out.records, problems);
@@ -946,7 +991,8 @@ impl<'a> Table<'a> {
                     let Some(cell) = row.of_channel(channel) else { continue };
                     let found = row.parse(channel.index, cell, Column::Value).and_then(|value| {
                         let factor = row.factor(kind, Column::Value)?;
-                        let finding = finding(kind, value * factor, None, survey);
+                        let error = row.std_error(Column::Value, factor)?;
+                        let finding = finding(kind, value * factor, error, survey);
                         self.record(row, format!("{} {}", survey.name, n + 1), finding)
                     });
                     take(found, &mut out.records, problems);
@@ -959,24 +1005,9 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// Tables of a gauge, or a place across, a column.
+    /// Tables of a gauge a column.
     fn of_channels(&mut self) -> Result<Holds, Problem> {
-        let is_grid =
-            self.channels.iter().all(|c| c.name.is_empty() || place_across(&c.name).is_some())
-                && !self.has(Column::Date);
         let of_all = self.survey.unit.clone();
-        if is_grid {
-            self.channels.retain(|channel| !channel.name.is_empty());
-            let kind = self.survey.kind.unwrap_or(Kind::HalfCell);
-            let given = of_all.as_deref().or(kind.units().first().map(|(name, _)| *name));
-            unit(Some(kind), given.filter(|name| !name.is_empty()))
-                .map_err(|why| self.in_header("UNIT", format!("the unit of the grid {why}")))?;
-            self.value_unit = given.filter(|name| !name.is_empty()).map(str::to_owned);
-            return match self.unfit(Holds::Grid { kind }) {
-                Some(message) => Err(self.in_header("UNFIT", message)),
-                None => Ok(Holds::Grid { kind }),
-            };
-        }
         let is_gauge = |channel: &Channel| {
             let unit = channel.unit.as_deref().or(of_all.as_deref());
             !channel.name.is_empty() && unit.and_then(GaugeUnit::named).is_some()
@@ -1045,14 +1076,14 @@ impl<'a> Table<'a> {
     /// Rows of one place as a profile.
     fn profile(
         &self,
-        rows: &[Row],
+        rows: &[&Row],
         name: String,
         column: Column,
     ) -> Result<Placed<Record>, Problem> {
         let numbers = |column| rows.iter().map(|r| r.number(column)).collect::<Result<Vec<_>, _>>();
         let (depths_mm, percents) = (numbers(Column::Depth)?, numbers(column)?);
         rows.iter().try_for_each(|row| row.is_percent(column))?;
-        let errors: Result<Vec<_>, _> = rows.iter().map(|r| r.std_error(column)).collect();
+        let errors: Result<Vec<_>, _> = rows.iter().map(|r| r.std_error(column, 1.0)).collect();
         let of_cement = column == Column::OfCement;
         let shows = Finding::Chloride {
             depths_mm,
@@ -1091,8 +1122,9 @@ impl<'a> Table<'a> {
             return Err(row.wrong(Column::Value, "UNIT", why));
         }
         let value = unit.si() * shown;
+        let own = self.error_unit.as_deref().and_then(GaugeUnit::named).unwrap_or(unit);
         let std_error = match row.optional(Column::StdError)? {
-            Some(error) if error > 0.0 => unit.si() * error,
+            Some(error) if error > 0.0 => own.si() * error,
             Some(error) => {
                 let message = format!("{error} is not above 0: say how uncertain the reading is");
                 return Err(row.wrong(Column::StdError, "RANGE", message));
@@ -1187,16 +1219,6 @@ fn every<'r, 't>(
     rows.iter().flat_map(move |row| channels.iter().map(move |channel| (row, channel)))
 }
 
-/// A place across a face, as the header of a grid tells it.
-fn place_across(name: &str) -> Option<f64> {
-    let base = split_unit(name).0;
-    let base = base.trim_end_matches(['m', ' ']);
-    [DecimalMark::Point, DecimalMark::Comma]
-        .into_iter()
-        .find_map(|mark| sheet::number(base, mark))
-        .map(|number| number.value)
-}
-
 /// What a kind of measurement shows at least and at most, in the unit of its own column.
 fn usual_range(kind: Kind) -> [f64; 2] {
     match kind {
@@ -1280,10 +1302,13 @@ impl Row<'_> {
         })
     }
 
-    /// A standard error, in the unit of its value.
-    fn std_error(&self, of: Column) -> Result<Option<f64>, Problem> {
+    /// A standard error in the unit of [`Finding`]; `factor` makes its value that. It has the unit
+    /// of its value where its header says none.
+    fn std_error(&self, of: Column, factor: f64) -> Result<Option<f64>, Problem> {
         let index = self.table.columns.iter().position(|c| *c == Some(of));
-        let factor = index.and_then(|i| self.table.scales.get(i)).map_or(1.0, |scale| scale[0]);
+        let of_value = index.and_then(|i| self.table.scales.get(i)).map_or(1.0, |scale| scale[0]);
+        let own = self.table.error_unit.as_deref().and_then(|unit| self.table.error_scale(unit));
+        let factor = own.unwrap_or(of_value * factor);
         Ok(self.optional(Column::StdError)?.map(|error| error * factor))
     }
 
@@ -1360,9 +1385,29 @@ impl Row<'_> {
         Ok(Some(day.date))
     }
 
-    /// Whether two rows tell of one profile.
-    fn same_place(&self, other: &Self) -> bool {
-        let places = [Column::Along, Column::Face, Column::Angle, Column::Height, Column::Date];
-        places.into_iter().all(|column| self.text(column) == other.text(column))
+    /// Where and when a row was measured, comparable: numbers by their value, however written.
+    fn place_key(&self) -> [Option<String>; 5] {
+        [Column::Along, Column::Angle, Column::Height, Column::Face, Column::Date].map(|column| {
+            let cell = self.text(column)?;
+            let number = match column {
+                Column::Face | Column::Date => None,
+                _ => self.optional(column).ok().flatten(),
+            };
+            Some(number.map_or_else(|| cell.to_ascii_lowercase(), |number| number.to_string()))
+        })
     }
+}
+
+/// Rows of one place each, in the order in which places come up.
+fn by_place<'r, 't>(rows: &'r [Row<'t>]) -> Vec<Vec<&'r Row<'t>>> {
+    let mut index = HashMap::with_capacity(rows.len());
+    let mut places: Vec<Vec<&Row>> = Vec::new();
+    for row in rows {
+        let at = *index.entry(row.place_key()).or_insert(places.len());
+        match places.get_mut(at) {
+            Some(place) => place.push(row),
+            None => places.push(vec![row]),
+        }
+    }
+    places
 }

@@ -403,7 +403,7 @@ impl<'a> Builder<'a> {
         json.text("name")
             .filter(|n| !n.is_empty())
             .or_else(mesh)
-            .map_or_else(|| format!("node {node}"), str::to_owned)
+            .map_or_else(|| format!("node {node}"), |name| name.replace(char::is_control, " "))
     }
 
     /// Where the steel of a node runs, told of the first object that it brought.

@@ -4,7 +4,7 @@
 
 use std::collections::{HashMap, HashSet};
 
-use super::{Column, Finding, Holds, Kind, Problem, Row, Rows, Table};
+use super::{Column, Finding, Holds, Kind, Placed, Problem, Record, Row, Rows, Table};
 
 /// What instruments and loggers write where they measured nothing, whatever the sign.
 const SENTINELS: [f64; 20] = [
@@ -53,19 +53,29 @@ pub(super) fn leave_out(table: &Table, rows: &mut Vec<Row>) -> Result<Option<Str
         return Ok(None);
     }
     let mut found: Vec<(usize, String)> = Vec::new();
+    let kind = kind_of(table);
     for index in value_columns(table) {
         let raw = |row: &Row| {
             let cell = row.cells.get(index).filter(|cell| !cell.is_empty())?;
             row.parse(index, cell, Column::Value).ok()
         };
         let values: Vec<Option<f64>> = rows.iter().map(raw).collect();
-        let is_positive = is_positive(table, index);
-        let others = values.iter().flatten().filter(|v| !is_listed(**v)).map(|v| v.abs());
-        let most = others.reduce(f64::max);
+        let is_positive = is_positive(table);
+        let mut others: Vec<f64> =
+            values.iter().flatten().filter(|v| !is_listed(**v, kind)).map(|v| v.abs()).collect();
+        // What a gauge shows may be anything; of one kind most are near the middle, and one that is
+        // odd does not make another usual.
+        let usual = match kind {
+            Some(_) => median(&mut others),
+            None => others.iter().copied().reduce(f64::max),
+        };
+        let is_far = |value: f64| {
+            usual.is_none_or(|usual| {
+                value > BEYOND * usual || kind.is_some() && value < usual / BEYOND
+            })
+        };
         let is_one = |value: f64| {
-            is_listed(value)
-                && (is_positive && value < 0.0
-                    || most.is_none_or(|most| value.abs() > BEYOND * most))
+            is_listed(value, kind) && (is_positive && value < 0.0 || is_far(value.abs()))
         };
         let ones: Vec<usize> = values
             .iter()
@@ -116,40 +126,96 @@ fn value_columns(table: &Table) -> Vec<usize> {
     table.columns.iter().position(|c| *c == Some(column)).into_iter().collect()
 }
 
-/// Whether what a column holds is never below 0.
-fn is_positive(table: &Table, index: usize) -> bool {
-    let kind = match (table.holds, table.columns.get(index).copied().flatten()) {
-        (Holds::Profiles { .. }, _) => return true,
-        (Holds::One { kind, .. } | Holds::Grid { kind }, _) => kind,
-        _ => return false,
-    };
-    kind != Kind::HalfCell
+/// What a table of one kind holds.
+fn kind_of(table: &Table) -> Option<Kind> {
+    match table.holds {
+        Holds::One { kind, .. } | Holds::Grid { kind } => Some(kind),
+        Holds::Profiles { .. } | Holds::Gauges | Holds::Channels => None,
+    }
 }
 
-fn is_listed(value: f64) -> bool {
+/// Whether what a table holds is never below 0.
+fn is_positive(table: &Table) -> bool {
+    match kind_of(table) {
+        Some(kind) => kind != Kind::HalfCell,
+        None => matches!(table.holds, Holds::Profiles { .. }),
+    }
+}
+
+fn is_listed(value: f64, kind: Option<Kind>) -> bool {
     let size = value.abs();
-    size >= HUGE || SENTINELS.iter().any(|one| (one - size).abs() < 1e-9 * size)
+    let is_it = |one: &f64| (one - size).abs() < 1e-9 * size;
+    let least = match kind {
+        // Potentials and velocities have as much as -99.9 and 255 by themselves.
+        Some(Kind::HalfCell | Kind::Velocity) => 888.0,
+        _ => 0.0,
+    };
+    // What one byte holds at most is no cover, but a number like others to a gauge.
+    let is_byte = matches!(kind, Some(Kind::Cover | Kind::Carbonation)) && is_it(&255.0);
+    size >= HUGE || is_byte || size >= least && SENTINELS.iter().any(is_it)
+}
+
+/// The middle one of values, the upper of two.
+fn median(values: &mut [f64]) -> Option<f64> {
+    values.sort_unstable_by(f64::total_cmp);
+    values.get(values.len() / 2).copied()
 }
 
 /// Potential below which its sign is doubted, mV: steel in dry concrete shows little more.
 const POSITIVE: f64 = 50.0;
 
-/// Refuses potentials none of which is negative.
+/// Refuses potentials most of which are not negative.
 pub(super) fn sign_lost(table: &Table, out: &Rows) -> Option<Problem> {
-    let potentials = || {
-        out.records.iter().filter_map(|record| match record.what.shows {
-            Finding::HalfCell { mv, .. } => Some((mv, record)),
-            _ => None,
-        })
+    let (lost, others) = signs(out);
+    let first = lost.first().filter(|_| !table.survey.confirmed && lost.len() >= others)?;
+    let Finding::HalfCell { mv, .. } = first.what.shows else { return None };
+    let of = match others {
+        0 => "none of the table is negative".to_owned(),
+        _ => format!("{} of {} of the table are not negative", lost.len(), lost.len() + others),
     };
-    let (most, first) = potentials().max_by(|a, b| a.0.total_cmp(&b.0))?;
-    let lost = most > POSITIVE && potentials().all(|(mv, _)| mv >= 0.0);
-    (lost && !table.survey.confirmed).then(|| {
-        let message = format!(
-            "{most} mV, and none of the table is negative: was the sign lost? write -{most}, or {CONFIRM}"
-        );
-        Problem::error(first.field("mV"), "SIGN", message)
-    })
+    let message = format!("{mv} mV, and {of}: was the sign lost? write -{mv}, or {CONFIRM}");
+    Some(Problem::error(first.field("mV"), "SIGN", message))
+}
+
+/// Potentials that seem to have lost their sign, and how many have one.
+fn signs(out: &Rows) -> (Vec<&Placed<Record>>, usize) {
+    let of = |fits: fn(f64) -> bool| move |record: &&Placed<Record>| matches!(record.what.shows, Finding::HalfCell { mv, .. } if fits(mv));
+    let lost = out.records.iter().filter(of(|mv| mv > POSITIVE)).collect();
+    (lost, out.records.iter().filter(of(|mv| mv < 0.0)).count())
+}
+
+/// Takes out the few potentials of a table that seem to have lost their sign; says which.
+pub(super) fn leave_out_unsigned(table: &Table, out: &mut Rows) -> Option<String> {
+    if table.survey.confirmed {
+        return None;
+    }
+    let (lost, _) = signs(out);
+    let first = lost.first()?;
+    let Finding::HalfCell { mv, .. } = first.what.shows else { return None };
+    let (place, n) = (first.place.clone(), lost.len());
+    let lost: HashSet<String> = lost.iter().map(|record| record.what.name.clone()).collect();
+    out.records.retain(|record| !lost.contains(&record.what.name));
+    let more = if n == 1 { String::new() } else { format!(" and {} more like it", n - 1) };
+    Some(format!(
+        "{place}: {mv} mV{more} not used among potentials below 0: was the sign lost? write -{mv}, or {CONFIRM}"
+    ))
+}
+
+/// Refuses rows that do not say where they were measured while others of the table do: where cells
+/// were merged, the first alone keeps what is written in them.
+pub(super) fn place_lost(table: &Table, rows: &[Row]) -> Option<Problem> {
+    if table.survey.confirmed || matches!(table.holds, Holds::Gauges | Holds::Channels) {
+        return None;
+    }
+    let places = [Column::Along, Column::Height, Column::Angle, Column::Face];
+    let given: Vec<Column> = places.into_iter().filter(|column| table.has(*column)).collect();
+    let is_placed = |row: &&Row| given.iter().any(|column| row.text(*column).is_some());
+    let first = rows.iter().find(|row| !is_placed(row))?;
+    let column = given.iter().find(|column| rows.iter().any(|row| row.text(**column).is_some()))?;
+    let message = format!(
+        "is empty, and other rows have it: were its cells merged? write where it was measured in every row, or {CONFIRM}: then it counts for the whole member"
+    );
+    Some(first.wrong(*column, "NO_PLACE", message))
 }
 
 /// What of a table is odd, and used.
@@ -191,9 +257,15 @@ const THIN: f64 = 6.0;
 
 /// Covers in cm or inch.
 pub(crate) fn doubt_covers(covers: &[f64]) -> Option<String> {
-    let most = covers.iter().copied().reduce(f64::max).filter(|most| *most < THIN)?;
+    let middle = median(&mut covers.to_vec()).filter(|middle| *middle < THIN)?;
+    let most = covers.iter().copied().reduce(f64::max).unwrap_or(middle);
+    let of = match most < THIN {
+        true => format!("no cover is above {most} mm"),
+        false => format!("most covers are no more than {middle} mm"),
+    };
+    let most = if most < THIN { most } else { middle };
     Some(format!(
-        "no cover is above {most} mm: in cm, {} mm, or in inches, {} mm? name the unit, \"cover [cm]\", or {CONFIRM}",
+        "{of}: in cm, {} mm, or in inches, {} mm? name the unit, \"cover [cm]\", or {CONFIRM}",
         short(10.0 * most),
         short(25.4 * most)
     ))
@@ -201,11 +273,11 @@ pub(crate) fn doubt_covers(covers: &[f64]) -> Option<String> {
 
 /// Depths in cm: none is 10, and some have decimals that nobody reads on a ruler of millimetres.
 fn doubt_carbonation(depths: &[f64]) -> Option<String> {
-    let most = depths.iter().copied().reduce(f64::max).filter(|most| *most < 10.0)?;
-    let is_fine = |mm: &&f64| ((**mm * 2.0).round() - **mm * 2.0).abs() > 1e-9;
+    let most = median(&mut depths.to_vec()).filter(|middle| *middle < 10.0)?;
+    let is_fine = |mm: &&f64| (mm.round() - **mm).abs() > 1e-9;
     (depths.iter().filter(is_fine).count() > 1).then(|| {
         format!(
-            "no depth of carbonation is above {most} mm, and they have decimals: in cm, {} mm? name the unit, \"carbonation [cm]\", or {CONFIRM}",
+            "most depths of carbonation are no more than {most} mm, and they have decimals: in cm, {} mm? name the unit, \"carbonation [cm]\", or {CONFIRM}",
             short(10.0 * most)
         )
     })
@@ -217,7 +289,7 @@ const LITTLE: f64 = 0.03;
 /// Content that no analysis finds, % of cement.
 const NOTHING: f64 = 0.005;
 /// Samples above this depth alone are doubted, mm: dust of one or two drill steps.
-const SHALLOW: f64 = 5.0;
+const SHALLOW: f64 = 8.0;
 
 /// A content as a fraction, or depths in cm.
 pub(crate) fn doubt_profile(depths: &[f64], cement: &[f64], concrete: &[f64]) -> Option<String> {
@@ -236,8 +308,9 @@ pub(crate) fn doubt_profile(depths: &[f64], cement: &[f64], concrete: &[f64]) ->
     let deepest = depths.iter().copied().reduce(f64::max)?;
     (depths.len() > 1 && deepest < SHALLOW).then(|| {
         format!(
-            "no sample is deeper than {deepest} mm: in cm, {} mm? name the unit, \"depth [cm]\", or {CONFIRM}",
-            short(10.0 * deepest)
+            "no sample is deeper than {deepest} mm: in cm, {} mm, or in inches, {} mm? name the unit, \"depth [cm]\", or {CONFIRM}",
+            short(10.0 * deepest),
+            short(25.4 * deepest)
         )
     })
 }
