@@ -264,12 +264,14 @@ impl Finding {
 }
 
 /// A table (CSV) of many observations of one kind on a member, one a row, or of readings of gauges.
-/// Its columns tell which: `mV`, `cover_mm`, `rebound`, `velocity_m_s`, `carbonation_mm`, `depth_mm`
-/// with `chloride_percent_cement` or `chloride_percent_concrete`, or `gauge` with `value`. Beside
-/// these: `along`, `face`, `angle_deg`, `height_m`, `date`, `std_error` (in the value's unit), beside
-/// `value` its `unit` and, of gauges, `test`. Of gauges, `along` with `face` or `angle_deg`, and `depth_mm`, are where a
-/// gauge is: one that is not known yet is defined by them, to measure strain along the axis (`ue`,
-/// `m/m`) or displacement upwards (`mm`, `m`).
+/// Its columns tell which: `mV`, `cover_mm`, `rebound`, `velocity_m_s`, `carbonation_mm`,
+/// `depth_mm` with `chloride_percent_cement` or `chloride_percent_concrete`, or `gauge` with
+/// `value`. Beside these: `along`, `face`, `angle_deg`, `height_m`, `date`, `std_error` (in the
+/// value's unit, or in its own, `std_error [mm]`), beside `value` its `unit` and, of gauges,
+/// `test`. A grid has places across a face as its columns (`height_m,0.25,0.50`), and its kind is
+/// given. Of gauges, `along` with `face` or `angle_deg`, and `depth_mm`, are where a gauge is: one
+/// that is not known yet is defined by them, to measure strain along the axis (`ue`, `m/m`) or
+/// displacement upwards (`mm`, `m`).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Survey {
