@@ -3,7 +3,7 @@
 
 use intrados_stage::sheet::{self, DecimalMark};
 
-use super::table::{is_deciding, is_known};
+use super::table::{is_deciding, is_grid_head, is_known};
 use crate::problem::Problem;
 
 /// How far down a header is looked for, lines.
@@ -119,7 +119,7 @@ fn find_header(lines: &[&str], named: Option<u8>) -> (usize, u8) {
     };
     let by_name = |cells: &[String]| {
         let known = cells.iter().filter(|cell| is_known(cell)).count();
-        cells.iter().any(|cell| is_deciding(cell)) || known > 1
+        cells.iter().any(|cell| is_deciding(cell)) || known > 1 || is_grid_head(cells)
     };
     let by_first = |cells: &[String]| {
         cells.len() > 1

@@ -124,6 +124,16 @@ pub(super) fn is_deciding(cell: &str) -> bool {
     matches!(found, Some(Column::Of(_) | Column::OfCement | Column::OfConcrete | Column::Gauge))
 }
 
+/// Whether cells name a place along the axis and places across a face: the head of a grid.
+pub(super) fn is_grid_head(cells: &[String]) -> bool {
+    let is_along = |cell: &String| {
+        let column = column_named(cell, "m").map(|(column, _)| column);
+        matches!(column, Some(Column::Height | Column::Along))
+    };
+    let Some((first, rest)) = cells.split_first() else { return false };
+    is_along(first) && !rest.is_empty() && rest.iter().all(|cell| place_across(cell).is_some())
+}
+
 impl Column {
     fn name(self) -> &'static str {
         COLUMNS.iter().find(|(_, column)| *column == self).map_or("", |(name, _)| name)

@@ -155,10 +155,12 @@ fn is_listed(value: f64, kind: Option<Kind>) -> bool {
     size >= HUGE || is_byte || size >= least && SENTINELS.iter().any(is_it)
 }
 
-/// The middle one of values, the upper of two.
+/// The middle of values, between two of them.
 fn median(values: &mut [f64]) -> Option<f64> {
     values.sort_unstable_by(f64::total_cmp);
-    values.get(values.len() / 2).copied()
+    let upper = values.get(values.len() / 2)?;
+    let lower = values.get((values.len() - 1) / 2)?;
+    Some(0.5 * (upper + lower))
 }
 
 /// Potential below which its sign is doubted, mV: steel in dry concrete shows little more.
