@@ -4,8 +4,11 @@ use glam::DVec3;
 
 use super::{Cell, HexFace, Mesh, MeshError};
 
-/// Hexahedra that a generator makes at most.
-pub(super) const MAX_CELLS: usize = 64 << 20;
+/// Cells of a grid in which a generator looks, at most.
+pub(super) const MAX_CELLS: usize = 8 << 20;
+/// Hexahedra that a generator makes at most: half a gigabyte, and ten times as many unknowns as a
+/// solver here takes in minutes.
+pub(super) const MAX_HEXES: usize = 4 << 20;
 
 /// A bent lattice of cells, some of which may be left out.
 pub(super) struct Lattice<'a> {
@@ -44,6 +47,11 @@ impl Lattice<'_> {
             for j in 0..nj {
                 for i in 0..ni {
                     let Some(region) = region(i, j, k) else { continue };
+                    if mesh.hexes.len() >= MAX_HEXES {
+                        return Err(MeshError::whole(format!(
+                            "more than {MAX_HEXES} elements: give larger ones"
+                        )));
+                    }
                     let hex = mesh.hexes.len() as u32;
                     let corners = [(i, j, k), (i + 1, j, k), (i + 1, j + 1, k), (i, j + 1, k)];
                     let nodes: [usize; 8] = std::array::from_fn(|c| {

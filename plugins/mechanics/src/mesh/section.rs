@@ -6,7 +6,7 @@ use glam::{DVec2, DVec3};
 
 use super::{
     Cell, HexFace, Mesh, MeshError,
-    generate::{MAX_CELLS, ascending},
+    generate::{MAX_CELLS, MAX_HEXES, ascending},
 };
 
 /// A plane mesh in x and y, m.
@@ -230,9 +230,9 @@ impl Section {
     pub(crate) fn extrude(&self, z: &[f64], region: &str) -> Result<Mesh, MeshError> {
         ascending("z", z)?;
         let (layers, points) = (z.len() - 1, self.points.len());
-        if layers.checked_mul(self.quads.len()).is_none_or(|n| n > MAX_CELLS) {
+        if layers.checked_mul(self.quads.len()).is_none_or(|n| n > MAX_HEXES) {
             return Err(MeshError::whole(format!(
-                "{layers} layers of {} elements: at most {MAX_CELLS} together",
+                "{layers} layers of {} elements: at most {MAX_HEXES} together",
                 self.quads.len()
             )));
         }
