@@ -74,68 +74,6 @@ fn bodies_that_nothing_holds_vibrate() {
     assert!(found[5].abs() < 1e-6 * found[6], "{found:?}");
 }
 
-/// The same bar, pulled at its end by 1 Pa from rest: when a wave has come back, both of its modes
-/// are at their farthest, (16/π²)(1 + 1/9) L/M; as long after that they are back. Pulled at a
-/// frequency with damping: Σ 2/(ρL)/(ω² − Ω² + iαΩ).
-#[test]
-fn a_bar_that_is_pulled_swings_as_its_modes_do() {
-    let modulus = E * 0.7 / (1.3 * 0.4);
-    let back = 2.0 * (3.0 / modulus).sqrt();
-    let bar =
-        bar(1.0, 8, 0.3, "C3D20") + "*BOUNDARY\nLOW,1\nALL,2,3\n*STEP\n*FREQUENCY\n2\n*END STEP\n";
-    let moved = format!(
-        "{bar}*STEP\n*MODAL DYNAMIC,DIRECT=NO\n.1,{back:?}\n*DLOAD\n8,P2,-1.\n*END STEP\n*STEP\n*MODAL DYNAMIC\n.01,{back:?}\n*END STEP\n"
-    );
-    let solved = solve(&moved);
-    let end = |of: &Solved| of.displacements.last().unwrap().x;
-    near(end(&solved[1]) * modulus / (16.0 / PI.powi(2) * (1.0 + 1.0 / 9.0)), 1.0, 1e-3);
-    near(end(&solved[2]) * modulus, 0.0, 1e-2);
-    let pace = 4.0 * PI;
-    let shaken = format!(
-        "{bar}*STEP\n*STEADY STATE DYNAMICS\n2.,2.\n*MODAL DAMPING,RAYLEIGH\n,,.7,0.\n*DLOAD\n8,P2,-1.\n*END STEP\n"
-    );
-    let solved = solve(&shaken);
-    let mut expected = [0.0; 2];
-    for n in [1.0, 3.0] {
-        let resists = [(n * 0.5 * PI).powi(2) * modulus / 3.0 - pace * pace, 0.7 * pace];
-        let share = 2.0 / 3.0 / (resists[0].powi(2) + resists[1].powi(2));
-        expected = [expected[0] + share * resists[0], expected[1] - share * resists[1]];
-    }
-    assert_eq!(solved.len(), 3);
-    (0..2).for_each(|i| near(end(&solved[1 + i]) / expected[i], 1.0, 2e-3));
-}
-
-/// The block on a spring of .3 N/m with a dashpot of .6 N·s/m beside it, pulled by 3 N from rest and
-/// shaken by them at 1 rad/s: ẍ + .2 ẋ + .1 x = 1.
-#[test]
-fn dashpots_slow_down_what_swings() {
-    let block = bar(1.0, 1, 1.0, "C3D20")
-        + "*NODE\n900,-1.,0.,0.\n*ELEMENT,TYPE=SPRINGA,ELSET=S\n900,900,1\n*SPRING,ELSET=S\n.3\n\
-           *ELEMENT,TYPE=DASHPOTA,ELSET=D\n901,900,1\n*DASHPOT,ELSET=D\n.6\n*BOUNDARY\nALL,2,3\n900,1,3\n";
-    let load = "*DLOAD\nALL,GRAV,1.,1.,0.,0.\n*END STEP\n";
-    let modes = "*STEP\n*FREQUENCY\n1\n*END STEP\n*STEP\n";
-    // s = .1, λ = .1, r = .3.
-    let swung = 10.0 * (1.0 - (-0.2f64).exp() * (0.6f64.cos() + 0.6f64.sin() / 3.0));
-    let moved = solve(&format!("{block}{modes}*MODAL DYNAMIC\n.5,2.\n{load}"));
-    near(moved[1].displacements[12].x / swung, 1.0, 2e-2);
-    let moved = solve(&format!("{block}*STEP\n*DYNAMIC,DIRECT,ALPHA=0.\n.01,2.\n{load}"));
-    near(moved[0].displacements[12].x / swung, 1.0, 2e-2);
-    let pace = 0.5 / PI;
-    let shaken = solve(&format!("{block}{modes}*STEADY STATE DYNAMICS\n{pace:?},{pace:?}\n{load}"));
-    // 1/(.1 − 1 + .2 i).
-    near(shaken[1].displacements[12].x, -0.9 / 0.85, 2e-2);
-    near(shaken[2].displacements[12].x, -0.2 / 0.85, 2e-2);
-}
-
-/// A block that nothing holds, of which two modes are known, falls by g t²/2.
-#[test]
-fn what_nothing_holds_falls() {
-    let deck = bar(1.0, 1, 1.0, "C3D20")
-        + "*BOUNDARY\nALL,2,3\n*STEP\n*FREQUENCY\n2\n*END STEP\n\
-           *STEP\n*MODAL DYNAMIC\n.5,2.\n*DLOAD\nALL,GRAV,3.,1.,0.,0.\n*END STEP\n";
-    near(solve(&deck)[1].displacements[12].x, 6.0, 1e-5);
-}
-
 /// A spring that is soft from 1 m on, pulled along itself by 11 N.
 #[test]
 fn springs_follow_their_table_and_turn() {
@@ -175,44 +113,6 @@ fn gaps_bear_once_they_have_closed() {
     near(10.0 * far + 1e3 * closed * share, 2.0, 1e-9);
     near(closed, 1e-3, 2e-5);
     near(10.0 * moved(2.0) + 1e-3, 2.0, 1e-5);
-}
-
-/// A block on a soft spring whose support follows a ramp moves with the ramp, and its modes by what
-/// the ramp's corner left: u = v (t − sin(ωt)/ω).
-#[test]
-fn what_stands_on_a_support_that_moves_is_carried_with_it() {
-    let block = bar(1.0, 1, 1.0, "C3D20")
-        + "*NODE\n900,-1.,0.,0.\n*ELEMENT,TYPE=SPRINGA,ELSET=S\n900,900,1\n*SPRING,ELSET=S\n.3\n\
-           *AMPLITUDE,NAME=A\n0.,0.,9.,9.\n*BOUNDARY\nALL,2,3\n900,1,3\n*STEP\n*FREQUENCY\n1\n*END STEP\n\
-           *STEP\n*MODAL DYNAMIC\n.01,2.\n*BOUNDARY,AMPLITUDE=A\n900,1,1,.5\n*END STEP\n";
-    // All of the block's mass, 3 kg, on .3 N/m, which is far softer than the block.
-    let pace = (0.3f64 / 3.0).sqrt();
-    let solved = solve(&block);
-    let far = solved[1].displacements[12].x;
-    near(far, 0.5 * (2.0 - (2.0 * pace).sin() / pace), 1e-3);
-}
-
-/// The same bar by the equations themselves, with all its modes: at rest again at 2 L/M. And damped by
-/// its mass alone, thrown as one body, it slows down by e^(−αt).
-#[test]
-fn a_bar_swings_in_time() {
-    let modulus = E * 0.7 / (1.3 * 0.4);
-    let back = 2.0 * (3.0 / modulus).sqrt();
-    let load = "*DLOAD\n8,P2,-1.\n*END STEP\n";
-    let moved = |kind: &str, way: &str| {
-        let held = bar(1.0, 8, 0.3, kind) + "*BOUNDARY\nLOW,1\nALL,2,3\n";
-        let deck = format!("{held}*STEP\n*DYNAMIC,{way}\n{:?},{back:?}\n{load}", back / 80.0);
-        *solve(&deck)[0].displacements.last().unwrap()
-    };
-    // A kink that increments, given or chosen, round.
-    near(moved("C3D20", "DIRECT,ALPHA=0.").x * modulus, 2.0, 0.05);
-    near(moved("C3D20R", "DIRECT,ALPHA=0.").x * modulus, 2.0, 0.05);
-    near(moved("C3D20", "ALPHA=0.").x * modulus, 2.0, 0.05);
-    let thrown = bar(1.0, 1, 1.0, "C3D20")
-        .replace("*DENSITY", "*DAMPING,ALPHA=2.,BETA=0.\n*DENSITY")
-        + "*BOUNDARY\nALL,2,3\n*STEP\n*DYNAMIC,DIRECT,ALPHA=0.\n.001,1.\n*DLOAD\nALL,GRAV,1.,1.,0.,0.\n*END STEP\n";
-    // ẍ + 2 ẋ = 1 from rest.
-    near(solve(&thrown)[0].displacements[0].x, 0.5 - 0.25 * (1.0 - (-2.0f64).exp()), 1e-5);
 }
 
 /// Warmed through at one end, free to grow: all of it grows alike, without stress.

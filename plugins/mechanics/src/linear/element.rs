@@ -49,8 +49,6 @@ pub(super) struct Element<'a> {
     material: &'a Material,
     orientation: Option<&'a Orientation>,
     places: Vec<DVec3>,
-    /// Points of its shape.
-    rule: fn(Shape) -> Vec<Point>,
 }
 
 impl<'a> Element<'a> {
@@ -64,14 +62,7 @@ impl<'a> Element<'a> {
             material: &deck.materials[*material as usize],
             orientation: cell.orientation.map(|o| &deck.orientations[o as usize]),
             places: cell.nodes.iter().map(|&n| deck.nodes[n as usize]).collect(),
-            rule: Shape::points,
         }
-    }
-
-    /// The element by points enough for motions that its own do not feel.
-    pub(super) fn finest(mut self) -> Self {
-        self.rule = Shape::finest_points;
-        self
     }
 
     pub(super) fn shape(&self) -> Shape {
@@ -121,7 +112,7 @@ impl<'a> Element<'a> {
     /// Points of integration.
     pub(super) fn points(&self) -> Vec<Point> {
         if self.cell.points.is_empty() {
-            (self.rule)(self.cell.shape)
+            self.cell.shape.points()
         } else {
             self.cell.points.clone()
         }
@@ -575,16 +566,11 @@ impl<'a> Element<'a> {
         }
     }
 
-    /// ∫ ρ N Nᵀ, row by row, by the points that `of` says of its shape where it has none of its own.
-    pub(super) fn mass(
-        &self,
-        of: impl Fn(Shape) -> Vec<Point>,
-        warmth: &Warmth,
-        m: &mut [f64],
-    ) -> Result<(), Folded> {
+    /// ∫ ρ N Nᵀ, row by row.
+    pub(super) fn mass(&self, warmth: &Warmth, m: &mut [f64]) -> Result<(), Folded> {
         let n = self.places.len();
         let own = &self.cell.points;
-        let points = if own.is_empty() { of(self.cell.shape) } else { own.clone() };
+        let points = if own.is_empty() { self.cell.shape.fine_points() } else { own.clone() };
         for (natural, weight) in points {
             let at = self.at(natural, weight)?;
             let density = self.density(at.value(&warmth.now));

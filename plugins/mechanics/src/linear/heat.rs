@@ -76,11 +76,10 @@ pub(super) fn modes(
     let cold = &deck.cold;
     let (conduction, _) = body.assembled(job, |e, k, f| body.flow(e, cold, k, f))?;
     let (capacity, _) = body.assembled(job, |e, m, _| body.capacity(e, cold, m))?;
-    let found = modes::smallest(conduction, &capacity, count, job).map_err(|e| match e {
+    let eigenvalues = modes::smallest(conduction, &capacity, count, job).map_err(|e| match e {
         Failed::Solve(error) => error.into(),
         _ => body.lost("eigenvalues"),
     })?;
-    let eigenvalues = found.into_iter().map(|m| m.value).collect();
     let unknowns = body.free.count();
     Ok(Solved { name: step.name.clone(), eigenvalues, unknowns, ..Solved::default() })
 }

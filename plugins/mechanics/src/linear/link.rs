@@ -28,8 +28,6 @@ pub(super) enum Link {
     Ground,
     /// SPRING2: a component of one node to a component of another.
     Components,
-    /// DASHPOTA: along the line between two nodes.
-    Damper,
     /// A B31 that a `*PRE-TENSION SECTION` stands for.
     Bolt,
     /// GAPUNI: bears along a direction once two nodes have come near.
@@ -44,7 +42,6 @@ impl Link {
             "SPRINGA" => Some(Self::Between),
             "SPRING1" => Some(Self::Ground),
             "SPRING2" => Some(Self::Components),
-            "DASHPOTA" => Some(Self::Damper),
             "GAPUNI" => Some(Self::Gap),
             "DCOUP3D" => Some(Self::Coupling),
             _ => None,
@@ -53,7 +50,7 @@ impl Link {
 
     pub(super) fn nodes(self) -> usize {
         match self {
-            Self::Between | Self::Damper | Self::Components | Self::Gap | Self::Bolt => 2,
+            Self::Between | Self::Components | Self::Gap | Self::Bolt => 2,
             Self::Ground | Self::Coupling => 1,
         }
     }
@@ -63,7 +60,6 @@ impl Reader {
     pub(super) fn linked(&mut self, card: &Card<'_>) -> Result<(), Fault> {
         match plain(card).as_str() {
             "SPRING" => self.spring(card),
-            "DASHPOT" => self.dashpot(card),
             "GAP" => self.gap(card),
             "MPC" => self.multiple(card),
             "RIGIDBODY" => self.rigid_body(card),
@@ -100,8 +96,8 @@ impl Reader {
             })?;
             let ends: Option<[u32; 2]> =
                 raw.nodes.as_slice().try_into().ok().filter(|_| link == Link::Between);
-            let (law, drag) = (law.clone(), Vec::new());
-            self.deck.springs.push(Spring { terms, ends, stiffness, law, drag, gap: None });
+            let law = law.clone();
+            self.deck.springs.push(Spring { terms, ends, stiffness, law, gap: None });
             self.sprung.insert(element);
         }
         Ok(())
@@ -117,34 +113,6 @@ impl Reader {
         }
         let ascends = law.len() > 1 && law.is_sorted_by(|a, b| a.0 < b.0);
         ascends.then_some(law).ok_or_else(|| card.fault("needed are two elongations, ascending"))
-    }
-
-    /// Force by speed, each with its frequency where it changes with that.
-    fn dashpot(&mut self, card: &Card<'_>) -> Result<(), Fault> {
-        card.only(&["ELSET"])?;
-        let mut drag = Vec::new();
-        for row in card.rows() {
-            let numbers = row.numbers("force by speed, frequency", 1..=2)?;
-            let frequency = numbers.get(1).copied().unwrap_or(0.0);
-            drag.push((frequency, numbers[0] * self.units.stress() * self.units.length()));
-        }
-        if drag.is_empty() || !drag.is_sorted_by(|a, b| a.0 < b.0) {
-            return Err(card.fault("needed are: force by speed, frequency, these ascending"));
-        }
-        for element in self.named_elements(card)? {
-            let raw = self.raw[element as usize].clone();
-            let found = match raw.kind {
-                Kind::Link(Link::Damper) => self.spring_terms(&raw.nodes, Link::Between, &[]),
-                _ => None,
-            };
-            let why =
-                || card.fault(format!("element {} is no dashpot, or has no length", raw.label));
-            let (terms, drag) = (found.ok_or_else(why)?, drag.clone());
-            let (ends, law, gap) = (None, Vec::new(), None);
-            self.deck.springs.push(Spring { terms, ends, stiffness: 0.0, law, drag, gap });
-            self.sprung.insert(element);
-        }
-        Ok(())
     }
 
     /// How wide it is, the direction in which it opens, stiffness once it has closed, and the pull
@@ -177,9 +145,8 @@ impl Reader {
                 return Err(card.fault(format!("element {} is no GAPUNI", raw.label)));
             };
             let terms = terms(&[(a, -direction), (b, direction)]);
-            let (ends, stiffness, law, drag) = (None, 0.0, Vec::new(), Vec::new());
-            let gap = Some(gap);
-            self.deck.springs.push(Spring { terms, ends, stiffness, law, drag, gap });
+            let (ends, stiffness, law, gap) = (None, 0.0, Vec::new(), Some(gap));
+            self.deck.springs.push(Spring { terms, ends, stiffness, law, gap });
             self.sprung.insert(element);
         }
         Ok(())

@@ -40,7 +40,6 @@ impl Reader {
             | "EXPANSION"
             | "CONDUCTIVITY"
             | "SPECIFICHEAT"
-            | "DAMPING"
             | "PLASTIC"
             | "CYCLICHARDENING"
             | "HYPERELASTIC"
@@ -111,15 +110,6 @@ impl Reader {
                     self.deck.notes.push(note);
                 }
                 material.finite = Some(law);
-            }
-            "DAMPING" => {
-                card.only(&["ALPHA", "BETA"])?;
-                for (to, name) in material.damping.iter_mut().zip(["ALPHA", "BETA"]) {
-                    let Some(word) = card.get(name) else { continue };
-                    let found = word.parse().ok().filter(|d: &f64| *d >= 0.0);
-                    let wrong = || card.fault(format!("{name} is a number that is not below 0"));
-                    *to = found.ok_or_else(wrong)?;
-                }
             }
             _ => {
                 card.only(&[])?;

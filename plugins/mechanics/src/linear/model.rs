@@ -16,7 +16,6 @@ use super::{
     shape::{Point, Shape},
 };
 use crate::{
-    model::interpolate,
     tensor::{self, Frame, Voigt},
     write::Grid,
 };
@@ -97,8 +96,6 @@ pub(super) struct Spring {
     pub(super) stiffness: f64,
     /// Elongation, m, and force, N, where these are not in proportion.
     pub(super) law: Vec<(f64, f64)>,
-    /// Of a dashpot: frequency, Hz, and N·s/m.
-    pub(super) drag: Vec<(f64, f64)>,
     pub(super) gap: Option<Gap>,
 }
 
@@ -143,11 +140,6 @@ impl Spring {
         }
     }
 
-    /// Force by speed at a frequency, Hz; none of a spring.
-    pub(super) fn drag(&self, frequency: f64) -> f64 {
-        interpolate(&self.drag, frequency).unwrap_or(0.0)
-    }
-
     /// Adds its stiffness, row by row.
     pub(super) fn resist(&self, k: &mut [f64]) {
         self.outer(self.stiffness, k);
@@ -177,8 +169,6 @@ pub(super) struct Material {
     pub(super) conductivity: Option<Table<3>>,
     /// J/(kg·K).
     pub(super) specific_heat: Option<Table<1>>,
-    /// Rayleigh's: so many times the mass, 1/s, and so many times the stiffness, s.
-    pub(super) damping: [f64; 2],
 }
 
 /// The axes of a material.
@@ -260,37 +250,6 @@ pub(super) enum Procedure {
     },
     /// The smallest factors of the loads at which the structure buckles.
     Buckling { count: usize },
-    /// Motion over time by the modes of the last step of them: in increments of so many seconds, or
-    /// from corner to corner of what acts.
-    Motion { increment: Option<f64>, duration: f64 },
-    /// Motion over time by the equations themselves, in increments of so many seconds or shorter
-    /// ones, with Hilber's, Hughes' and Taylor's α.
-    Dynamic { increment: f64, fixed: bool, duration: f64, alpha: f64 },
-    /// What stays of vibrations at frequencies between these, Hz: so many of them between two
-    /// modes, the nearer to these the larger the bias.
-    Harmonic { range: [f64; 2], points: u32, bias: f64 },
-}
-
-/// What takes energy from a mode.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub(super) enum Damping {
-    #[default]
-    None,
-    /// Rayleigh's: so many times the mass, 1/s, and so many times the stiffness, s.
-    Rayleigh { mass: f64, stiffness: f64 },
-    /// Over critical damping, by mode.
-    Shares(Vec<f64>),
-}
-
-/// What follows one course over time or frequency.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Course {
-    /// Time, s, or frequency, Hz, and factor; none: the factor is one.
-    pub(super) points: Vec<(f64, f64)>,
-    /// Forces where the factor is one, on what does not move where it is supported.
-    pub(super) loads: Step,
-    /// Supports where the factor is one, and no forces.
-    pub(super) base: Step,
 }
 
 /// A way of heating.
@@ -328,11 +287,6 @@ pub(super) struct Step {
     pub(super) kept: BTreeSet<(u32, u8)>,
     /// N.
     pub(super) forces: BTreeMap<(u32, u8), f64>,
-    /// Forces a quarter of a period before them, N.
-    pub(super) early: BTreeMap<(u32, u8), f64>,
-    /// What acts over time or frequency, beside all that.
-    pub(super) courses: Vec<Course>,
-    pub(super) damping: Damping,
     /// Pa, by element and face.
     pub(super) pressures: BTreeMap<(u32, u8), f64>,
     pub(super) pulls: Vec<(u32, Pull)>,
@@ -343,26 +297,6 @@ pub(super) struct Step {
     pub(super) heating: BTreeMap<Heated, [f64; 2]>,
     /// Elements that are made of another material than their own.
     pub(super) materials: BTreeMap<u32, u32>,
-}
-
-impl Step {
-    /// The step at a time of it: everything times what its course is then.
-    pub(super) fn at(&self, time: f64) -> Self {
-        let mut now = Self { courses: Vec::new(), ..self.clone() };
-        for course in &self.courses {
-            let factor = interpolate(&course.points, time).unwrap_or(1.0);
-            let add = |to: &mut BTreeMap<(u32, u8), f64>, from: &BTreeMap<(u32, u8), f64>| {
-                for (&key, value) in from {
-                    *to.entry(key).or_default() += factor * value;
-                }
-            };
-            add(&mut now.held, &course.base.held);
-            add(&mut now.forces, &course.loads.forces);
-            add(&mut now.pressures, &course.loads.pressures);
-            now.pulls.extend(course.loads.pulls.iter().map(|&(e, pull)| (e, pull.times(factor))));
-        }
-        now
-    }
 }
 
 impl Deck {

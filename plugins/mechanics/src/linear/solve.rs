@@ -7,15 +7,12 @@ use intrados_stage::{Cancelled, Job};
 
 use super::{
     constraint::{Bound, Equation, Sum},
-    dynamic,
     element::{Element, Folded, Warmth},
     free::Free,
     heat, large,
     model::{Deck, Procedure, Pull, Spring, Step},
-    modes::{self, Mode},
+    modes,
     plastic::Flow,
-    shape::Shape,
-    vibrate,
 };
 use crate::{
     sparse::{BlockMatrix, Constraints, Method, SolveError, solve},
@@ -98,20 +95,6 @@ pub enum LinearError {
         /// Name of the step.
         step: String,
     },
-    /// Motion by modes of what was held otherwise.
-    #[error("{step}: supports and equations are not those of the step of *FREQUENCY before it")]
-    OtherModes {
-        /// Name of the step.
-        step: String,
-    },
-    /// Vibrations that grow without end.
-    #[error("{step}: without *MODAL DAMPING there is no end to vibrations at {frequency} Hz")]
-    Resonance {
-        /// Name of the step.
-        step: String,
-        /// Hz.
-        frequency: f64,
-    },
     /// Temperatures or modes that do not settle.
     #[error("{step}: {what} do not converge")]
     NotConverged {
@@ -144,8 +127,6 @@ const TOLERANCE: f64 = 1e-6;
 pub(super) struct Past {
     /// Of every unknown; empty before the first step.
     pub(super) displacements: Vec<f64>,
-    /// The same by the second; empty after a step that is none of motion.
-    pub(super) speeds: Vec<f64>,
     pub(super) stresses: Vec<Vec<Voigt>>,
     /// What has flowed at every point; empty: nothing.
     pub(super) flow: Vec<Vec<Flow>>,
@@ -153,7 +134,6 @@ pub(super) struct Past {
     pub(super) large: bool,
     /// Of every node.
     pub(super) temperatures: Vec<f64>,
-    pub(super) modes: Option<vibrate::Modes>,
 }
 
 impl Past {
@@ -164,8 +144,7 @@ impl Past {
 }
 
 impl Deck {
-    /// Computes every step: what it ends in; where it asks for vibrations, the real and the imaginary
-    /// part at every frequency.
+    /// Computes every step: what it ends in.
     ///
     /// # Errors
     /// [`LinearError`].
@@ -175,22 +154,15 @@ impl Deck {
         let mut solved = Vec::new();
         for (i, step) in self.steps.iter().enumerate() {
             job.step(i, self.steps.len())?;
-            if !matches!(step.procedure, Procedure::Dynamic { .. }) {
-                past.speeds.clear();
-            }
             let part = job.part(i as f64 / share, (i + 1) as f64 / share);
             match step.procedure {
-                Procedure::Motion { .. } | Procedure::Harmonic { .. } => {
-                    solved.extend(vibrate::solve(self, step, &mut past, &part)?);
-                }
                 Procedure::Modes { count, stressed, .. } if step.diameters.is_some() => {
-                    past.modes = None;
                     let [least, most] = step.diameters.unwrap_or_default();
                     for number in least..=most {
                         let (system, all) =
                             self.vibrating(step, count, stressed, Some(number), &past, &part)?;
                         let name = format!("{}, {number} nodal diameters", step.name);
-                        solved.push(Solved { name, ..system.eigenvalues(&all) });
+                        solved.push(Solved { name, ..system.eigenvalues(all) });
                     }
                 }
                 _ => solved.push(self.step(step, &mut past, &part)?),
@@ -204,20 +176,16 @@ impl Deck {
             Procedure::Modes { count, heat: true, .. } => heat::modes(self, step, count, job),
             Procedure::Modes { count, stressed, .. } => {
                 let (system, all) = self.vibrating(step, count, stressed, None, past, job)?;
-                let solved = system.eigenvalues(&all);
-                let order = system.free.order().to_vec();
-                past.modes = Some(vibrate::Modes { order, all, state: Vec::new() });
-                Ok(solved)
+                Ok(system.eigenvalues(all))
             }
             Procedure::Buckling { count } => {
                 let system = System::new(self, step, past)?;
-                Ok(system.eigenvalues(&system.buckling(count, job)?))
+                Ok(system.eigenvalues(system.buckling(count, job)?))
             }
             Procedure::Heat { steady, first, duration } => {
                 let time = (!steady).then_some([first, duration]);
                 heat::solve(self, step, time, &mut past.temperatures, job)
             }
-            Procedure::Dynamic { .. } => dynamic::solve(self, step, past, job),
             _ if step.large => large::solve(self, step, past, job),
             _ => System::new(self, step, past)?.solve(past, job),
         }
@@ -233,7 +201,7 @@ impl Deck {
         diameters: Option<u32>,
         past: &Past,
         job: &Job,
-    ) -> Result<(System<'a>, Vec<Mode>), LinearError> {
+    ) -> Result<(System<'a>, Vec<f64>), LinearError> {
         let (system, stiffness) = if stressed && past.large {
             large::tangent(self, step, past, diameters, job)?
         } else {
@@ -357,51 +325,13 @@ impl<'a> System<'a> {
         })
     }
 
-    /// Forces of what acts on elements and nodes, without those of warmth and of stress from the
-    /// beginning.
-    pub(super) fn forces(&self, job: &Job) -> Result<Vec<f64>, LinearError> {
-        let loads = self.distributed()?;
-        let (_, mut rhs) = self.assembled(job, |e, _, f| {
-            if e < self.deck.cells.len() {
-                loads.add(e, &self.element(e), &self.warmth(e), f)
-            } else {
-                Ok(())
-            }
-        })?;
-        self.nodal(&self.step.forces, &mut rhs)?;
-        Ok(rhs)
-    }
-
-    /// How everything moves with supports that move slowly, and Tᵀ M times that.
-    pub(super) fn carried(&self, job: &Job) -> Result<(Vec<f64>, Vec<f64>), LinearError> {
-        let (stiffness, rhs) =
-            self.assembled(job, |e, k, f| match e.checked_sub(self.deck.cells.len()) {
-                None => {
-                    // Of supports alone: what warms and strains from the beginning is no part of it.
-                    let mut other = vec![0.0; f.len()];
-                    self.element(e).stiffness(&self.warmth(e), |_| tensor::ZERO, k, &mut other)
-                }
-                Some(spring) => {
-                    self.deck.springs[spring].resist(k);
-                    Ok(())
-                }
-            })?;
-        let none = Constraints::new(self.free.count());
-        let found = solve(&stiffness, &rhs, &none, Method::Direct, TOLERANCE, job);
-        let free = found.map_err(|e| self.explained(e))?.x;
-        // Of the mass, what supports push is on the other side: −Tᵀ M c.
-        let (mass, pulled) = self.mass(job)?;
-        let pushed = modes::times(&mass, &free).iter().zip(&pulled).map(|(a, b)| a - b).collect();
-        Ok((self.free.expanded(&free), pushed))
-    }
-
     fn mass(&self, job: &Job) -> Result<(BlockMatrix<1>, Vec<f64>), LinearError> {
         let cells = self.deck.cells.len();
         self.assembled(job, |e, m, _| {
             if e >= cells {
                 return Ok(());
             }
-            self.element(e).mass(Shape::fine_points, &self.warmth(e), m)
+            self.element(e).mass(&self.warmth(e), m)
         })
     }
 
@@ -494,7 +424,7 @@ impl<'a> System<'a> {
 
     /// The smallest factors at which the loads of the step make the structure unstable:
     /// (K + λ K_σ) φ = 0.
-    fn buckling(&self, count: usize, job: &Job) -> Result<Vec<Mode>, LinearError> {
+    fn buckling(&self, count: usize, job: &Job) -> Result<Vec<f64>, LinearError> {
         let stresses = self.stresses(&self.moved(job)?)?;
         let (stiffness, _) = self.stiffness(job)?;
         let mut softening = self.stress_stiffness(&stresses, job)?;
@@ -508,7 +438,7 @@ impl<'a> System<'a> {
         other: &BlockMatrix<1>,
         count: usize,
         job: &Job,
-    ) -> Result<Vec<Mode>, LinearError> {
+    ) -> Result<Vec<f64>, LinearError> {
         modes::smallest(stiffness, other, count, job).map_err(|failed| match failed {
             modes::Failed::Solve(error) => self.explained(error),
             modes::Failed::Indefinite => LinearError::Unstable { step: self.step.name.clone() },
@@ -516,9 +446,8 @@ impl<'a> System<'a> {
         })
     }
 
-    fn eigenvalues(&self, modes: &[Mode]) -> Solved {
+    fn eigenvalues(&self, eigenvalues: Vec<f64>) -> Solved {
         let (name, unknowns) = (self.step.name.clone(), self.free.count());
-        let eigenvalues = modes.iter().map(|m| m.value).collect();
         Solved { name, eigenvalues, unknowns, ..Solved::default() }
     }
 

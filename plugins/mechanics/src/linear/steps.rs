@@ -5,17 +5,17 @@ mod load;
 mod needs;
 mod procedure;
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use super::{
-    model::{Course, Damping, Heated, Procedure, Pull, Step},
+    model::{Heated, Procedure, Pull, Step},
     read::{Reader, plain},
 };
 use crate::{
     model::interpolate,
     read::{Amplitude, Fault, abaqus::card::Card, quote},
 };
-use procedure::{begin, damping, diameters, procedure};
+use procedure::{begin, diameters, procedure};
 
 /// A value, the amplitude that it follows, and the step that set it (0: before the first).
 #[derive(Debug, Clone)]
@@ -31,7 +31,6 @@ pub(super) struct State {
     held: BTreeMap<(u32, u8), Given<f64>>,
     kept: BTreeMap<(u32, u8), Given<f64>>,
     forces: BTreeMap<(u32, u8), Given<f64>>,
-    early: BTreeMap<(u32, u8), Given<f64>>,
     pressures: BTreeMap<(u32, u8), Given<f64>>,
     pulls: BTreeMap<(String, String), Given<(Vec<u32>, Pull)>>,
     warm: BTreeMap<u32, Given<f64>>,
@@ -52,7 +51,6 @@ struct Open {
     duration: f64,
     perturbs: bool,
     procedure: Option<Procedure>,
-    damping: Damping,
     diameters: Option<[u32; 2]>,
     /// Whether displacements follow the temperatures.
     coupled: bool,
@@ -73,7 +71,6 @@ impl State {
             held: times(&self.held)?,
             kept: self.kept.keys().copied().collect(),
             forces: times(&self.forces)?,
-            early: times(&self.early)?,
             pressures: times(&self.pressures)?,
             materials: self.materials.clone(),
             ..Step::default()
@@ -84,13 +81,6 @@ impl State {
             step.pulls.extend(elements.iter().map(|&e| (e, pull.times(factor))));
         }
         Ok(step)
-    }
-
-    /// Every amplitude that supports and forces follow.
-    fn amplitudes(&self) -> BTreeSet<Option<String>> {
-        let nodal = [&self.held, &self.forces, &self.early, &self.pressures];
-        let nodal = nodal.into_iter().flat_map(|all| all.values().map(|g| &g.amplitude));
-        nodal.chain(self.pulls.values().map(|g| &g.amplitude)).cloned().collect()
     }
 
     /// Every step that began has ended, and there was one.
@@ -111,9 +101,9 @@ impl Reader {
     /// Everything that has an order.
     pub(super) fn history(&mut self, card: &Card<'_>, state: &mut State) -> Result<(), Fault> {
         let name = plain(card);
-        const WITHIN: &str = "STATIC DYNAMIC FREQUENCY BUCKLE HEATTRANSFER MODALDYNAMIC \
-            COUPLEDTEMPERATURE-DISPLACEMENT UNCOUPLEDTEMPERATURE-DISPLACEMENT STEADYSTATEDYNAMICS \
-            MODALDAMPING SELECTCYCLICSYMMETRYMODES ENDSTEP CLOAD DLOAD DSLOAD TEMPERATURE CFLUX \
+        const WITHIN: &str = "STATIC FREQUENCY BUCKLE HEATTRANSFER \
+            COUPLEDTEMPERATURE-DISPLACEMENT UNCOUPLEDTEMPERATURE-DISPLACEMENT \
+            SELECTCYCLICSYMMETRYMODES ENDSTEP CLOAD DLOAD DSLOAD TEMPERATURE CFLUX \
             DFLUX FILM RADIATE CHANGESOLIDSECTION";
         if WITHIN.split_ascii_whitespace().any(|w| w == name) && state.open.is_none() {
             return Err(card.fault(format!("*{} must stand in a *STEP", card.name)));
@@ -121,15 +111,11 @@ impl Reader {
         match name.as_str() {
             "STEP" => begin(card, state),
             "STATIC"
-            | "DYNAMIC"
             | "FREQUENCY"
             | "BUCKLE"
             | "HEATTRANSFER"
             | "COUPLEDTEMPERATURE-DISPLACEMENT"
-            | "UNCOUPLEDTEMPERATURE-DISPLACEMENT"
-            | "MODALDYNAMIC"
-            | "STEADYSTATEDYNAMICS" => procedure(card, &name, state),
-            "MODALDAMPING" => damping(card, state),
+            | "UNCOUPLEDTEMPERATURE-DISPLACEMENT" => procedure(card, &name, state),
             "SELECTCYCLICSYMMETRYMODES" => diameters(card, state),
             "ENDSTEP" => self.close(state),
             "EQUATION" => self.end_equations(card, state),
@@ -172,22 +158,13 @@ impl Reader {
             let time = if amplitude.total_time { state.time + duration } else { duration };
             Ok(interpolate(&amplitude.points, time).unwrap_or(1.0))
         };
-        let mut step = if let Procedure::Motion { .. }
-        | Procedure::Dynamic { .. }
-        | Procedure::Harmonic { .. } = procedure
-        {
-            Step { courses: self.courses(procedure, state, line)?, ..state.loads(|_| Ok(0.0))? }
-        } else {
-            state.loads(factor)?
-        };
-        (step.procedure, step.damping) = (procedure, open.damping.clone());
+        let mut step = Step { procedure, ..state.loads(factor)? };
         step.diameters = diameters;
         if diameters.is_some() && !matches!(procedure, Procedure::Modes { heat: false, .. }) {
             let why = "*SELECT CYCLIC SYMMETRY MODES stands in a step of *FREQUENCY";
             return Err(Fault::at(line, why));
         }
-        let may_be_large = matches!(procedure, Procedure::Static | Procedure::Dynamic { .. });
-        step.large = state.large && may_be_large;
+        step.large = state.large && procedure == Procedure::Static;
         if let Procedure::Heat { .. } | Procedure::Modes { heat: true, .. } = procedure {
             for (&node, given) in &state.temperatures {
                 step.temperatures.insert(node, given.value * factor(&given.amplitude)?);
@@ -211,38 +188,6 @@ impl Reader {
     fn amplitude_of(&self, name: &str, line: u32) -> Result<&Amplitude, Fault> {
         let missing = || Fault::at(line, format!("amplitude {} is not defined", quote(name)));
         self.amplitudes.get(name).ok_or_else(missing)
-    }
-
-    /// What acts in a step of motion or vibration, by the amplitudes that it follows.
-    fn courses(
-        &self,
-        procedure: Procedure,
-        state: &State,
-        line: u32,
-    ) -> Result<Vec<Course>, Fault> {
-        let mut courses = Vec::new();
-        for amplitude in state.amplitudes() {
-            let mut points = Vec::new();
-            if let Some(name) = &amplitude {
-                let found = self.amplitude_of(name, line)?;
-                let in_total = found.total_time && !matches!(procedure, Procedure::Harmonic { .. });
-                let begin = if in_total { state.time } else { 0.0 };
-                points.extend(found.points.iter().map(|&(at, factor)| (at - begin, factor)));
-            }
-            let own = |other: &Option<String>| Ok(if *other == amplitude { 1.0 } else { 0.0 });
-            let mut loads = state.loads(own)?;
-            let base = Step {
-                name: loads.name.clone(),
-                number: state.step,
-                held: loads.held.clone(),
-                materials: loads.materials.clone(),
-                ..Step::default()
-            };
-            loads.held.values_mut().for_each(|value| *value = 0.0);
-            self.moves(&base, &points, procedure, line)?;
-            courses.push(Course { points, loads, base });
-        }
-        Ok(courses)
     }
 }
 

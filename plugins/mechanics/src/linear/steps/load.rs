@@ -4,13 +4,13 @@ use std::collections::BTreeSet;
 
 use glam::DVec3;
 
-use super::{Given, Open, State, clear};
+use super::{Given, State, clear};
 use crate::{
     linear::{
         flat::{Plane, SLICE},
         law::ORDER,
         mesh::name_of,
-        model::{Procedure, Pull},
+        model::Pull,
         read::{Kind, Raw, Reader, Surface},
         thin::Thin,
         warm::is_temperature,
@@ -114,17 +114,10 @@ impl Reader {
 
     /// Forces. What is given twice in a step adds up, as in CalculiX.
     pub(super) fn cload(&mut self, card: &Card<'_>, state: &mut State) -> Result<(), Fault> {
-        card.only(&["OP", "AMPLITUDE", "TIME DELAY", "LOAD CASE"])?;
+        card.only(&["OP", "AMPLITUDE"])?;
         clear(card, state.step, &mut state.forces, |_| true)?;
-        clear(card, state.step, &mut state.early, |_| true)?;
-        let forces = match card.get("LOAD CASE") {
-            None | Some("1") => &mut state.forces,
-            Some("2") if harmonic(state.open.as_ref()) => &mut state.early,
-            Some(_) => {
-                return Err(card.fault("LOAD CASE is 1, or 2 in *STEADY STATE DYNAMICS"));
-            }
-        };
-        let amplitude = self.delayed(card)?;
+        let amplitude = name_of(card, "AMPLITUDE")?;
+        let forces = &mut state.forces;
         let around = self.around_nodes();
         for row in card.rows() {
             let [target, direction, value] = row.exactly("node or set, component, force")?;
@@ -146,22 +139,6 @@ impl Reader {
             }
         }
         Ok(())
-    }
-
-    /// The amplitude that a card names, which begins later where it says so.
-    fn delayed(&mut self, card: &Card<'_>) -> Result<Option<String>, Fault> {
-        let (Some(name), Some(delay)) = (name_of(card, "AMPLITUDE")?, card.get("TIME DELAY"))
-        else {
-            return name_of(card, "AMPLITUDE");
-        };
-        let wrong = || card.fault(format!("TIME DELAY={} is no time", quote(delay)));
-        let by: f64 = delay.parse().map_err(|_| wrong())?;
-        let mut later = self.amplitude_of(&name, card.line)?.clone();
-        later.points.iter_mut().for_each(|p| p.0 += by);
-        later.name = format!("{name} {by} s later");
-        let name = later.name.clone();
-        self.amplitudes.insert(name.clone(), later);
-        Ok(Some(name))
     }
 
     /// Nodes of planes where some are axially symmetric: all of them are in the slice then.
@@ -341,10 +318,6 @@ impl Reader {
         }
         Ok(())
     }
-}
-
-fn harmonic(open: Option<&Open>) -> bool {
-    matches!(open.and_then(|o| o.procedure), Some(Procedure::Harmonic { .. }))
 }
 
 pub(super) fn component(word: &str, row: Row<'_>) -> Result<u8, Fault> {

@@ -4,51 +4,14 @@ use super::State;
 use crate::{
     linear::{
         law::Elastic,
-        link::Link,
-        model::{Material, Procedure, Pull, Spring, Step},
+        model::{Material, Procedure, Pull, Spring},
         read::{Kind, Reader},
         shape::Shape,
     },
-    model::interpolate,
     read::Fault,
 };
 
 impl Reader {
-    /// Supports that move begin where they are, in fixed increments, and carry what has no stress.
-    pub(super) fn moves(
-        &self,
-        base: &Step,
-        points: &[(f64, f64)],
-        procedure: Procedure,
-        line: u32,
-    ) -> Result<(), Fault> {
-        let in_modes = !matches!(procedure, Procedure::Dynamic { .. });
-        if !in_modes || base.held.values().all(|value| *value == 0.0) {
-            return Ok(());
-        }
-        let is_stressed = |s: &Step| matches!(s.procedure, Procedure::Modes { stressed: true, .. });
-        if self.deck.steps.iter().any(is_stressed) {
-            return Err(Fault::at(
-                line,
-                "supports that move what is under stress are not computed",
-            ));
-        }
-        if self.deck.springs.iter().any(|s| !s.drag.is_empty()) {
-            return Err(Fault::at(line, "supports that move beside dashpots are not computed"));
-        }
-        let Procedure::Motion { increment, .. } = procedure else { return Ok(()) };
-        let follows =
-            self.deck.steps.last().is_some_and(|s| matches!(s.procedure, Procedure::Motion { .. }));
-        if follows || interpolate(points, 0.0).unwrap_or(1.0) != 0.0 {
-            let why = "supports that move need an AMPLITUDE that begins at 0, in the first step of motion";
-            return Err(Fault::at(line, why));
-        }
-        if increment.is_none() {
-            return Err(Fault::at(line, "supports that move need fixed increments, not DIRECT=NO"));
-        }
-        Ok(())
-    }
-
     /// Materials have what the step needs, and the step follows one that it rests on.
     pub(super) fn suits(
         &self,
@@ -67,9 +30,9 @@ impl Reader {
         };
         let heats =
             matches!(procedure, Procedure::Heat { .. } | Procedure::Modes { heat: true, .. });
-        let may_be_large = matches!(procedure, Procedure::Static | Procedure::Dynamic { .. });
+        let is_large = state.large && procedure == Procedure::Static;
         if !heats {
-            let has: fn(&Material) -> bool = if state.large && may_be_large {
+            let has: fn(&Material) -> bool = if is_large {
                 |m| m.elastic.is_some() || m.finite.is_some()
             } else {
                 |m| m.elastic.is_some()
@@ -79,7 +42,7 @@ impl Reader {
                 "*ELASTIC, nor with NLGEOM *HYPERELASTIC, *HYPERFOAM or *DEFORMATION PLASTICITY",
             )?;
             let flows = match procedure {
-                Procedure::Static | Procedure::Dynamic { .. } => state.large,
+                Procedure::Static => state.large,
                 other => matches!(other, Procedure::Modes { .. }),
             };
             let is_known = |m: &Material| {
@@ -91,16 +54,7 @@ impl Reader {
                 return Err(Fault::at(line, format!("material {}: {why}", material.name)));
             }
         }
-        if let Procedure::Motion { .. } | Procedure::Harmonic { .. } = procedure {
-            return self.vibrates(state, line);
-        }
-        if let Procedure::Dynamic { .. } = procedure {
-            lacks(|m| m.density.is_some(), "*DENSITY")?;
-            if !state.warm.is_empty() {
-                return Err(Fault::at(line, "a *TEMPERATURE in a *DYNAMIC step is not computed"));
-            }
-        }
-        if state.large && may_be_large {
+        if is_large {
             return self.turns();
         }
         let bends = |s: &Spring| !s.law.is_empty() || s.gap.is_some();
@@ -149,7 +103,6 @@ impl Reader {
     fn turns(&self) -> Result<(), Fault> {
         let lacks = |kind: Kind| match kind {
             Kind::Solid(Shape::Hex8Mean | Shape::Bar) => Some("C3D8R and T3D2"),
-            Kind::Link(Link::Damper) => Some("dashpots"),
             _ => None,
         };
         match self.raw.iter().find_map(|raw| Some((raw, lacks(raw.kind)?))) {
@@ -159,23 +112,5 @@ impl Reader {
                 Err(Fault::at(raw.line, format!("element {}: {what} {why}", raw.label)))
             }
         }
-    }
-
-    /// A step of motion or vibration follows one of frequencies, and nothing warms in it.
-    fn vibrates(&self, state: &State, line: u32) -> Result<(), Fault> {
-        let is_modes = |s: &Step| matches!(s.procedure, Procedure::Modes { heat: false, .. });
-        match self.deck.steps.iter().rev().find(|s| is_modes(s)) {
-            None => {
-                return Err(Fault::at(line, "needed is a step of *FREQUENCY before this one"));
-            }
-            Some(step) if step.diameters.is_some() => {
-                return Err(Fault::at(line, "motion by modes of sectors is not computed"));
-            }
-            Some(_) => {}
-        }
-        if !state.warm.is_empty() {
-            return Err(Fault::at(line, "a *TEMPERATURE in motion by modes is not computed"));
-        }
-        Ok(())
     }
 }
