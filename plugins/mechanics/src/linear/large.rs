@@ -76,19 +76,18 @@ fn moved(
     Ok((all, flow, solved))
 }
 
-/// What a step of vibrations is about (of so many nodal diameters), and the stiffness where the step
+/// What a step of vibrations is about, and the stiffness where the step
 /// before has left it.
 pub(super) fn tangent<'a>(
     deck: &'a Deck,
     step: &'a Step,
     past: &Past,
-    diameters: Option<u32>,
     job: &Job,
 ) -> Result<(System<'a>, BlockMatrix<1>), LinearError> {
     let all = started(deck, past);
     let mut equations = deck.constraints(step, past);
     bend(deck, step, &mut equations, &all);
-    let system = System::bound(deck, step, past, &equations, diameters, true)?;
+    let system = System::of(deck, step, past, sums(deck, step, &equations)?, true);
     let loads = system.distributed()?;
     let (matrix, _) = system.assembled(job, |e, k, f| {
         let flow = of_element(&past.flow, e);

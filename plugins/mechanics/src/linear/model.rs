@@ -37,8 +37,6 @@ pub struct Deck {
     pub(super) until: HashMap<usize, u32>,
     /// Those of the equations that are others where displacements are large.
     pub(super) curved: Vec<Curved>,
-    /// Those of the equations that bind two sides of a sector.
-    pub(super) phases: HashMap<usize, Phase>,
     /// Nodes that thicken flat elements, and the node that each has its temperature from.
     pub(super) twins: HashMap<u32, u32>,
     /// Nodes whose displacement is given as the mean of others.
@@ -74,15 +72,6 @@ pub(super) struct Cell {
     pub(super) points: Vec<Point>,
     /// Material and axes at every point, where they differ.
     pub(super) layers: Vec<(u32, Option<u32>)>,
-}
-
-/// How an equation binds two sides of a sector.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Phase {
-    /// How many of its first terms are of the side that is ahead.
-    pub(super) ahead: usize,
-    /// By how much, where there is one nodal diameter.
-    pub(super) angle: f64,
 }
 
 /// A linear spring: its force is k times a sum of displacements, and acts on each by its factor.
@@ -277,8 +266,6 @@ pub(super) struct Step {
     /// From 1.
     pub(super) number: u32,
     pub(super) procedure: Procedure,
-    /// Fewest and most nodal diameters of vibrations of a sector.
-    pub(super) diameters: Option<[u32; 2]>,
     /// Whether equilibrium is where everything has gone to.
     pub(super) large: bool,
     /// Components (in the node's own axes) and values, m.

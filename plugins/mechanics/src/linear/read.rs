@@ -8,7 +8,6 @@ use std::{
 use glam::DVec3;
 
 use super::{
-    cyclic::Sides,
     flat::Flat,
     link::Link,
     model::Deck,
@@ -29,8 +28,8 @@ use crate::read::{
 const KNOWN: &str = "NODE ELEMENT NSET ELSET SURFACE MATERIAL ELASTIC DENSITY EXPANSION \
     CONDUCTIVITY SPECIFICHEAT PLASTIC CYCLICHARDENING HYPERELASTIC HYPERFOAM \
     DEFORMATIONPLASTICITY SOLIDSECTION SHELLSECTION BEAMSECTION BEAMGENERALSECTION NODALTHICKNESS \
-    NORMAL MEMBRANE ORIENTATION AMPLITUDE TRANSFORM EQUATION TIE CYCLICSYMMETRYMODEL \
-    SELECTCYCLICSYMMETRYMODES SPRING GAP MPC RIGIDBODY DISTRIBUTINGCOUPLING \
+    NORMAL MEMBRANE ORIENTATION AMPLITUDE TRANSFORM EQUATION TIE \
+    SPRING GAP MPC RIGIDBODY DISTRIBUTINGCOUPLING \
     PRE-TENSIONSECTION PHYSICALCONSTANTS INITIALCONDITIONS BOUNDARY STEP STATIC FREQUENCY \
     BUCKLE HEATTRANSFER COUPLEDTEMPERATURE-DISPLACEMENT \
     UNCOUPLEDTEMPERATURE-DISPLACEMENT CLOAD DLOAD DSLOAD \
@@ -106,14 +105,12 @@ fn deck(bytes: &[u8], units: Units) -> Result<Deck, Fault> {
     let ended = state.ended();
     reader.keep(ended);
     // Ties last: what is bound otherwise stays as it is.
-    for pass in [Reader::equation, Reader::tie, Reader::cyclic] {
+    for pass in [Reader::equation, Reader::tie] {
         cards.iter().for_each(|card| {
             let read = pass(&mut reader, card);
             reader.keep(read);
         });
     }
-    let sectored = reader.sectored();
-    reader.keep(sectored);
     reader.fail()?;
     Ok(reader.finished())
 }
@@ -199,8 +196,6 @@ pub(super) struct Reader {
     /// W/(m²·K⁴).
     pub(super) boltzmann: Option<f64>,
     pub(super) tied: bool,
-    /// Ties between sides of sectors.
-    pub(super) sides: Vec<Sides>,
     /// Places of equations by the component that comes first in them.
     pub(super) equations: BTreeMap<(u32, u8), usize>,
     /// Steps that end equations, all of them or those that a component comes first in.
@@ -229,7 +224,6 @@ impl Reader {
             normals: HashMap::new(),
             boltzmann: None,
             tied: false,
-            sides: Vec::new(),
             equations: BTreeMap::new(),
             ended: Vec::new(),
             in_material: false,

@@ -155,18 +155,7 @@ impl Deck {
         for (i, step) in self.steps.iter().enumerate() {
             job.step(i, self.steps.len())?;
             let part = job.part(i as f64 / share, (i + 1) as f64 / share);
-            match step.procedure {
-                Procedure::Modes { count, stressed, .. } if step.diameters.is_some() => {
-                    let [least, most] = step.diameters.unwrap_or_default();
-                    for number in least..=most {
-                        let (system, all) =
-                            self.vibrating(step, count, stressed, Some(number), &past, &part)?;
-                        let name = format!("{}, {number} nodal diameters", step.name);
-                        solved.push(Solved { name, ..system.eigenvalues(all) });
-                    }
-                }
-                _ => solved.push(self.step(step, &mut past, &part)?),
-            }
+            solved.push(self.step(step, &mut past, &part)?);
         }
         Ok(solved)
     }
@@ -175,7 +164,7 @@ impl Deck {
         match step.procedure {
             Procedure::Modes { count, heat: true, .. } => heat::modes(self, step, count, job),
             Procedure::Modes { count, stressed, .. } => {
-                let (system, all) = self.vibrating(step, count, stressed, None, past, job)?;
+                let (system, all) = self.vibrating(step, count, stressed, past, job)?;
                 Ok(system.eigenvalues(all))
             }
             Procedure::Buckling { count } => {
@@ -191,22 +180,19 @@ impl Deck {
         }
     }
 
-    /// The first modes of motion, with the stresses of the step before or without; those of so many
-    /// nodal diameters.
+    /// The first modes of motion, with the stresses of the step before or without.
     fn vibrating<'a>(
         &'a self,
         step: &'a Step,
         count: usize,
         stressed: bool,
-        diameters: Option<u32>,
         past: &Past,
         job: &Job,
     ) -> Result<(System<'a>, Vec<f64>), LinearError> {
         let (system, stiffness) = if stressed && past.large {
-            large::tangent(self, step, past, diameters, job)?
+            large::tangent(self, step, past, job)?
         } else {
-            let equations = self.constraints(step, past);
-            let system = System::bound(self, step, past, &equations, diameters, false)?;
+            let system = System::new(self, step, past)?;
             let stresses = if stressed { past.stresses.as_slice() } else { &[] };
             let stiffness = system.stiff_under(stresses, job)?;
             (system, stiffness)
@@ -258,28 +244,7 @@ impl<'a> System<'a> {
         Ok(Self::of(deck, step, past, sums, false))
     }
 
-    /// From what binds it; with so many nodal diameters, real and imaginary parts of a sector.
-    pub(super) fn bound(
-        deck: &'a Deck,
-        step: &'a Step,
-        past: &Past,
-        equations: &[Equation],
-        diameters: Option<u32>,
-        large: bool,
-    ) -> Result<Self, LinearError> {
-        let sums = match diameters {
-            None => sums(deck, step, equations)?,
-            Some(number) => {
-                let supports = step.held.len() + step.kept.len();
-                let all = deck.waved(equations, supports, number);
-                sums_of(6 * deck.nodes.len() as u32, step, &all)?
-            }
-        };
-        Ok(Self::of(deck, step, past, sums, large))
-    }
-
-    /// From what every unknown is by the free ones, with springs that turn or not. Where there are
-    /// several copies of the deck, their unknowns follow each other.
+    /// From what every unknown is by the free ones, with springs that turn or not.
     pub(super) fn of(
         deck: &'a Deck,
         step: &'a Step,
@@ -288,10 +253,9 @@ impl<'a> System<'a> {
         large: bool,
     ) -> Self {
         let warm = if step.warm.is_empty() { &past.temperatures } else { &step.warm };
-        let (each, own) = (deck.cells.len() + deck.springs.len(), 3 * deck.nodes.len());
-        let copies = sums.len() / own.max(1);
-        let elements = (0..copies * each).map(|e| copied(deck, e, large));
-        let free = Free::new(deck, sums, elements, |unknown| unknown % own as u32 / 3);
+        let count = deck.cells.len() + deck.springs.len();
+        let elements = (0..count).map(|e| unknowns(deck, e, large));
+        let free = Free::new(deck, sums, elements, |unknown| unknown / 3);
         Self { deck, step, warm: warm.clone(), free, large }
     }
 
@@ -341,12 +305,7 @@ impl<'a> System<'a> {
         job: &Job,
         fill: impl Fn(usize, &mut [f64], &mut [f64]) -> Result<(), Folded> + Sync,
     ) -> Result<(BlockMatrix<1>, Vec<f64>), LinearError> {
-        let each = self.deck.cells.len() + self.deck.springs.len();
-        self.free.assembled(
-            job,
-            |e| copied(self.deck, e, self.large),
-            |e, k, f| fill(e % each, k, f),
-        )
+        self.free.assembled(job, |e| unknowns(self.deck, e, self.large), fill)
     }
 
     fn solve(self, past: &mut Past, job: &Job) -> Result<Solved, LinearError> {
@@ -542,22 +501,10 @@ pub(super) fn sums(
     step: &Step,
     equations: &[Equation],
 ) -> Result<Vec<Sum>, LinearError> {
-    sums_of(3 * deck.nodes.len() as u32, step, equations)
-}
-
-/// So many unknowns by what is free.
-fn sums_of(count: u32, step: &Step, equations: &[Equation]) -> Result<Vec<Sum>, LinearError> {
     // Supports first: equations then bind what is left.
     let bound = Bound::new(equations)
         .map_err(|e| LinearError::Contradiction { step: step.name.clone(), line: e.line })?;
-    Ok((0..count).map(|u| bound.of(u)).collect())
-}
-
-/// Unknowns of an element or a spring of one of several copies of the deck.
-fn copied(deck: &Deck, e: usize, large: bool) -> Vec<u32> {
-    let each = deck.cells.len() + deck.springs.len();
-    let shift = (e / each * 3 * deck.nodes.len()) as u32;
-    unknowns(deck, e % each, large).into_iter().map(|u| u + shift).collect()
+    Ok((0..3 * deck.nodes.len() as u32).map(|u| bound.of(u)).collect())
 }
 
 /// Unknowns of an element or, after the elements, of a spring, which may turn.

@@ -15,7 +15,7 @@ use crate::{
     model::interpolate,
     read::{Amplitude, Fault, abaqus::card::Card, quote},
 };
-use procedure::{begin, diameters, procedure};
+use procedure::{begin, procedure};
 
 /// A value, the amplitude that it follows, and the step that set it (0: before the first).
 #[derive(Debug, Clone)]
@@ -51,7 +51,6 @@ struct Open {
     duration: f64,
     perturbs: bool,
     procedure: Option<Procedure>,
-    diameters: Option<[u32; 2]>,
     /// Whether displacements follow the temperatures.
     coupled: bool,
 }
@@ -103,7 +102,7 @@ impl Reader {
         let name = plain(card);
         const WITHIN: &str = "STATIC FREQUENCY BUCKLE HEATTRANSFER \
             COUPLEDTEMPERATURE-DISPLACEMENT UNCOUPLEDTEMPERATURE-DISPLACEMENT \
-            SELECTCYCLICSYMMETRYMODES ENDSTEP CLOAD DLOAD DSLOAD TEMPERATURE CFLUX \
+            ENDSTEP CLOAD DLOAD DSLOAD TEMPERATURE CFLUX \
             DFLUX FILM RADIATE CHANGESOLIDSECTION";
         if WITHIN.split_ascii_whitespace().any(|w| w == name) && state.open.is_none() {
             return Err(card.fault(format!("*{} must stand in a *STEP", card.name)));
@@ -116,7 +115,6 @@ impl Reader {
             | "HEATTRANSFER"
             | "COUPLEDTEMPERATURE-DISPLACEMENT"
             | "UNCOUPLEDTEMPERATURE-DISPLACEMENT" => procedure(card, &name, state),
-            "SELECTCYCLICSYMMETRYMODES" => diameters(card, state),
             "ENDSTEP" => self.close(state),
             "EQUATION" => self.end_equations(card, state),
             "BOUNDARY" => self.boundary(card, state),
@@ -144,7 +142,7 @@ impl Reader {
 
     /// What is in force at the end of the step.
     fn end(&mut self, procedure: Procedure, open: &Open, state: &State) -> Result<(), Fault> {
-        let &Open { line, duration, diameters, .. } = open;
+        let &Open { line, duration, .. } = open;
         self.suits(procedure, state, line)?;
         let in_time = matches!(procedure, Procedure::Heat { steady: false, .. });
         let factor = |amplitude: &Option<String>| -> Result<f64, Fault> {
@@ -159,11 +157,6 @@ impl Reader {
             Ok(interpolate(&amplitude.points, time).unwrap_or(1.0))
         };
         let mut step = Step { procedure, ..state.loads(factor)? };
-        step.diameters = diameters;
-        if diameters.is_some() && !matches!(procedure, Procedure::Modes { heat: false, .. }) {
-            let why = "*SELECT CYCLIC SYMMETRY MODES stands in a step of *FREQUENCY";
-            return Err(Fault::at(line, why));
-        }
         step.large = state.large && procedure == Procedure::Static;
         if let Procedure::Heat { .. } | Procedure::Modes { heat: true, .. } = procedure {
             for (&node, given) in &state.temperatures {

@@ -17,7 +17,6 @@ pub(super) fn begin(card: &Card<'_>, state: &mut State) -> Result<(), Fault> {
         duration: 1.0,
         perturbs: card.get("PERTURBATION").is_some(),
         procedure: None,
-        diameters: None,
         coupled: false,
     });
     if let Some(word) = card.word("NLGEOM") {
@@ -91,19 +90,6 @@ pub(super) fn procedure(card: &Card<'_>, name: &str, state: &mut State) -> Resul
         }
     };
     open.procedure = Some(procedure);
-    Ok(())
-}
-
-/// `*SELECT CYCLIC SYMMETRY MODES`
-pub(super) fn diameters(card: &Card<'_>, state: &mut State) -> Result<(), Fault> {
-    card.only(&["NMIN", "NMAX"])?;
-    let number = |name: &str| card.get(name).and_then(|word| word.parse::<u32>().ok());
-    let (least, most) = (number("NMIN").unwrap_or(0), number("NMAX"));
-    let most = most.filter(|m| (least..=10_000).contains(m));
-    let most = most.ok_or_else(|| card.fault("needed are NMIN and NMAX, numbers that ascend"))?;
-    if let Some(open) = &mut state.open {
-        open.diameters = Some([least, most]);
-    }
     Ok(())
 }
 
