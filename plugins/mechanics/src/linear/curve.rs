@@ -14,10 +14,6 @@ pub(super) enum Curve {
     Body { reference: u32, turning: u32, unit: f64, nodes: Vec<u32>, widens: Vec<(u32, DMat3)> },
     /// The mean angle about an axis through their middle is an unknown over a unit.
     Turn { nodes: Vec<u32>, axis: DVec3, angle: u32, unit: f64 },
-    /// Nodes of one plane.
-    Plane(Vec<u32>),
-    /// Nodes of one line.
-    Straight(Vec<u32>),
 }
 
 /// One of a deck, and the place of its equations among those of the deck.
@@ -72,8 +68,6 @@ impl Curved {
                 equation.terms.push((*angle, -1.0 / unit));
                 vec![equation]
             }
-            Curve::Plane(nodes) => plane(&now, nodes)?,
-            Curve::Straight(nodes) => straight(&now, nodes)?,
         };
         all.iter_mut().for_each(|e| e.line = self.line);
         Some(all)
@@ -173,55 +167,6 @@ fn turn<F: Fn(u32) -> f64>(
     Some((nodes.iter().zip(slopes).map(|(&n, s)| (n, s - shared)).collect(), mean))
 }
 
-/// Nodes but the three that say which plane it is.
-fn plane<F: Fn(u32) -> f64>(now: &Now<'_, F>, nodes: &[u32]) -> Option<Vec<Equation>> {
-    let (a, b) = ends(now, nodes)?;
-    let line = (now.was(b) - now.was(a)).try_normalize()?;
-    let off = |n: u32| (now.was(n) - now.was(a)).reject_from_normalized(line).length();
-    let c = nodes.iter().copied().max_by(|&m, &n| off(m).total_cmp(&off(n)))?;
-    let (p, q) = (now.is(b) - now.is(a), now.is(c) - now.is(a));
-    let normal = p.cross(q);
-    let was = |n: u32| now.was(n) - now.was(a);
-    let scale = was(b).cross(was(c)).length().recip();
-    let others = nodes.iter().copied().filter(|&n| n != a && n != b && n != c);
-    let equation = |n: u32| {
-        let w = now.is(n) - now.is(a);
-        let slopes = [normal, q.cross(w), w.cross(p)].map(|s| scale * s);
-        let from = -(slopes[0] + slopes[1] + slopes[2]);
-        let slopes = [(n, slopes[0]), (b, slopes[1]), (c, slopes[2]), (a, from)];
-        now.equation(&slopes, scale * w.dot(normal))
-    };
-    scale.is_finite().then(|| others.map(equation).collect())
-}
-
-/// Nodes but the two that say which line it is.
-fn straight<F: Fn(u32) -> f64>(now: &Now<'_, F>, nodes: &[u32]) -> Option<Vec<Equation>> {
-    let (a, b) = ends(now, nodes)?;
-    let p = now.is(b) - now.is(a);
-    let scale = now.was(b).distance(now.was(a)).recip();
-    // Two of three components say all: not that along which the line runs most.
-    let most = (0..3).max_by(|&i, &j| p[i].abs().total_cmp(&p[j].abs()))?;
-    let mut all = Vec::new();
-    for &n in nodes.iter().filter(|&&n| n != a && n != b) {
-        let w = now.is(n) - now.is(a);
-        for i in (0..3).filter(|&i| i != most) {
-            let axis = DVec3::AXES[i];
-            let slopes = [p.cross(axis), axis.cross(w)].map(|s| scale * s);
-            let slopes = [(n, slopes[0]), (b, slopes[1]), (a, -(slopes[0] + slopes[1]))];
-            all.push(now.equation(&slopes, scale * w.cross(p)[i]));
-        }
-    }
-    scale.is_finite().then_some(all)
-}
-
-/// The first node and that farthest from it.
-fn ends<F: Fn(u32) -> f64>(now: &Now<'_, F>, nodes: &[u32]) -> Option<(u32, u32)> {
-    let &a = nodes.first()?;
-    let away = |n: u32| now.was(n).distance(now.was(a));
-    let b = nodes.iter().copied().max_by(|&m, &n| away(m).total_cmp(&away(n)))?;
-    (away(b) > 0.0).then_some((a, b))
-}
-
 /// Components of nodes with their factors.
 pub(super) fn terms(factors: &[(u32, DVec3)]) -> Vec<(u32, f64)> {
     let three = |&(n, f): &(u32, DVec3)| [(3 * n, f.x), (3 * n + 1, f.y), (3 * n + 2, f.z)];
@@ -293,8 +238,6 @@ mod tests {
                 ],
             },
             Curve::Turn { nodes: vec![0, 1, 2, 3], axis: DVec3::Z, angle: 17, unit: 2.0 },
-            Curve::Plane(vec![0, 1, 2, 3, 4]),
-            Curve::Straight(vec![0, 1, 2]),
         ] {
             let all = curved(&curve).equations(&PLACES, |u| moved[u as usize]).unwrap();
             for (k, equation) in all.iter().enumerate() {

@@ -32,8 +32,6 @@ pub(super) enum Link {
     Bolt,
     /// GAPUNI: bears along a direction once two nodes have come near.
     Gap,
-    /// DCOUP3D: the node of a `*DISTRIBUTING COUPLING`.
-    Coupling,
 }
 
 impl Link {
@@ -43,7 +41,6 @@ impl Link {
             "SPRING1" => Some(Self::Ground),
             "SPRING2" => Some(Self::Components),
             "GAPUNI" => Some(Self::Gap),
-            "DCOUP3D" => Some(Self::Coupling),
             _ => None,
         }
     }
@@ -51,7 +48,7 @@ impl Link {
     pub(super) fn nodes(self) -> usize {
         match self {
             Self::Between | Self::Components | Self::Gap | Self::Bolt => 2,
-            Self::Ground | Self::Coupling => 1,
+            Self::Ground => 1,
         }
     }
 }
@@ -61,9 +58,6 @@ impl Reader {
         match plain(card).as_str() {
             "SPRING" => self.spring(card),
             "GAP" => self.gap(card),
-            "MPC" => self.multiple(card),
-            "RIGIDBODY" => self.rigid_body(card),
-            "DISTRIBUTINGCOUPLING" => self.coupling(card),
             _ => Ok(()),
         }
     }
@@ -171,52 +165,6 @@ impl Reader {
         }
     }
 
-    /// `MEANROT`: nodes, each for its three components, and the node whose place is the axis and
-    /// whose first component is the angle. `PLANE` and `STRAIGHT`: nodes that stay in one.
-    fn multiple(&mut self, card: &Card<'_>) -> Result<(), Fault> {
-        card.only(&[])?;
-        let mut rows = card.rows().peekable();
-        while let Some(row) = rows.next() {
-            let mut words = row.fields().filter(|w| !w.is_empty());
-            let kind = words.next().unwrap_or_default().to_ascii_uppercase();
-            let mut nodes = Vec::new();
-            for word in words {
-                nodes.extend(self.some_nodes(word, row)?);
-            }
-            while let Some(next) =
-                rows.next_if(|r| !r.text.starts_with(|c: char| c.is_ascii_alphabetic()))
-            {
-                for word in next.fields().filter(|w| !w.is_empty()) {
-                    nodes.push(self.node(word, next)?);
-                }
-            }
-            let curve = match kind.as_str() {
-                "MEANROT" => {
-                    let pilot = nodes.pop().ok_or_else(|| row.fault("MEANROT needs nodes"))?;
-                    nodes.dedup();
-                    let axis = self.deck.nodes[pilot as usize].try_normalize();
-                    let axis =
-                        axis.ok_or_else(|| row.fault("the axis of MEANROT has no length"))?;
-                    // The pilot is an angle: its unit is not that of lengths.
-                    Curve::Turn { nodes, axis, angle: 3 * pilot, unit: self.units.length() }
-                }
-                "PLANE" => Curve::Plane(nodes),
-                "STRAIGHT" => Curve::Straight(nodes),
-                other => {
-                    let other = quote(other);
-                    return Err(row.fault(format!(
-                        "*MPC: {other}: MEANROT, PLANE and STRAIGHT are supported"
-                    )));
-                }
-            };
-            if !self.bound(curve, row.line) {
-                let why = "lie on one axis, on one line, or are one";
-                return Err(row.fault(format!("*MPC: the nodes of {kind} {why}")));
-            }
-        }
-        Ok(())
-    }
-
     /// Adds a constraint that is another where displacements are large, unless its nodes are too
     /// few to say anything.
     pub(super) fn bound(&mut self, curve: Curve, line: u32) -> bool {
@@ -225,68 +173,6 @@ impl Reader {
         self.deck.equations.extend(equations);
         self.deck.curved.push(curved);
         true
-    }
-
-    /// Every node of the set moves and turns with the reference.
-    fn rigid_body(&mut self, card: &Card<'_>) -> Result<(), Fault> {
-        card.only(&["NSET", "ELSET", "REF NODE", "ROT NODE"])?;
-        if !card.rows().collect::<Vec<_>>().is_empty() {
-            return Err(card.fault("*RIGID BODY has no lines of data"));
-        }
-        let row = Row { line: card.line, text: "" };
-        let nodes: BTreeSet<u32> = match name_of(card, "NSET")? {
-            Some(set) => self.some_nodes(&set, row)?.into_iter().collect(),
-            None => {
-                let elements = self.named_elements(card)?;
-                elements.iter().flat_map(|&e| self.raw[e as usize].nodes.clone()).collect()
-            }
-        };
-        let reference = self.node(&card.need("REF NODE")?, row)?;
-        let turning = match name_of(card, "ROT NODE")? {
-            Some(word) => self.node(&word, row)?,
-            None => {
-                let turning = self.hidden_node(reference);
-                self.turning.insert(reference, turning);
-                turning
-            }
-        };
-        // Components of a node that turns are angles.
-        let unit = if self.turning.contains_key(&reference) { 1.0 } else { self.units.length() };
-        let nodes = nodes.into_iter().filter(|&n| n != reference && n != turning).collect();
-        let widens = Vec::new();
-        self.bound(Curve::Body { reference, turning, unit, nodes, widens }, card.line);
-        Ok(())
-    }
-
-    /// The node of a coupling moves as the weighted mean of others.
-    fn coupling(&mut self, card: &Card<'_>) -> Result<(), Fault> {
-        card.only(&["ELSET", "NAME"])?;
-        let elements = self.named_elements(card)?;
-        let mut weights: BTreeMap<u32, f64> = BTreeMap::new();
-        for row in card.rows() {
-            let [target, weight] = row.exactly("node or set, weight")?;
-            let weight = row.number(weight)?;
-            if weight.is_nan() || weight <= 0.0 {
-                return Err(row.fault("a weight must be above 0"));
-            }
-            self.some_nodes(target, row)?.into_iter().for_each(|n| {
-                weights.insert(n, weight);
-            });
-        }
-        let sum: f64 = weights.values().sum();
-        for element in elements {
-            let raw = &self.raw[element as usize];
-            let (Kind::Link(Link::Coupling), &[node]) = (raw.kind, raw.nodes.as_slice()) else {
-                return Err(card.fault(format!("element {} is no DCOUP3D", raw.label)));
-            };
-            for i in 0..3 {
-                let mut terms = vec![(3 * node + i, 1.0)];
-                terms.extend(weights.iter().map(|(n, w)| (3 * n + i, -w / sum)));
-                self.deck.equations.push(Equation { terms, value: 0.0, line: card.line });
-            }
-            self.sprung.insert(element);
-        }
-        Ok(())
     }
 
     /// `*PRE-TENSION SECTION`: the nodes of a surface are doubled. Elements on its side move as

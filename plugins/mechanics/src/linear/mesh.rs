@@ -315,12 +315,12 @@ impl Reader {
         Ok(())
     }
 
-    /// Every spring and coupling is described.
+    /// Every spring is described.
     pub(super) fn unlinked(&self) -> Result<(), Fault> {
         let open = |(i, raw): (usize, &Raw)| {
             let open = matches!(raw.kind, Kind::Link(_)) && !self.sprung.contains(&(i as u32));
             open.then(|| {
-                let why = "has no *SPRING, *GAP or *DISTRIBUTING COUPLING";
+                let why = "has no *SPRING or *GAP";
                 Fault::at(raw.line, format!("element {} {why}", raw.label))
             })
         };

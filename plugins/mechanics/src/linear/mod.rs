@@ -10,7 +10,7 @@
 //! |---|---|
 //! | elements | C3D4, C3D6, C3D8, C3D8I, C3D8R (with CalculiX' stiffness against hourglasses: they bend far too much with one or two across), C3D10, C3D15, C3D20, C3D20R; CPS, CPE and CAX of 3, 4, 6 and 8 nodes and 8R, as layers of solids; S3, S4, S6, S8, S8R and B31, B32, B32R (`*NORMAL`; sections RECT, CIRC, PIPE, BOX, with offsets); T3D2, SPRINGA (also NONLINEAR), SPRING1, SPRING2, GAPUNI |
 //! | materials | `*ELASTIC` (ISO, ORTHO, ANISO, ENGINEERING CONSTANTS), `*EXPANSION`, `*CONDUCTIVITY` (ISO, ORTHO), `*DENSITY`, `*SPECIFIC HEAT`, all by temperature; `*PLASTIC` (isotropic, kinematic and both, with NLGEOM); with NLGEOM `*HYPERELASTIC` (NEO HOOKE, MOONEY-RIVLIN, OGDEN), `*HYPERFOAM`, `*DEFORMATION PLASTICITY`; `*ORIENTATION` |
-//! | constraints | `*BOUNDARY`, `*EQUATION` (also REMOVE), `*TRANSFORM`, `*TIE`, `*RIGID BODY`, `*MPC` (MEANROT, PLANE, STRAIGHT), `*DISTRIBUTING COUPLING`, `*PRE-TENSION SECTION` |
+//! | constraints | `*BOUNDARY`, `*EQUATION` (also REMOVE), `*TRANSFORM`, `*TIE`, `*PRE-TENSION SECTION` |
 //! | loads | `*CLOAD`, `*DLOAD` (P, GRAV, CENTRIF), `*DSLOAD` (P), `*TEMPERATURE`, `*INITIAL CONDITIONS` (TEMPERATURE, STRESS, PLASTIC STRAIN), `*AMPLITUDE`; `*CFLUX`, `*DFLUX`, `*FILM`, `*RADIATE` |
 //! | steps | `*STATIC`, `*FREQUENCY`, `*BUCKLE`, `*HEAT TRANSFER` (steady, in time, FREQUENCY), `*COUPLED` and `*UNCOUPLED TEMPERATURE-DISPLACEMENT` (steady), `*STATIC` with `NLGEOM` (not of C3D8R, T3D2); `OP=MOD` and `OP=NEW` |
 //!

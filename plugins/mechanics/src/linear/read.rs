@@ -29,7 +29,7 @@ const KNOWN: &str = "NODE ELEMENT NSET ELSET SURFACE MATERIAL ELASTIC DENSITY EX
     CONDUCTIVITY SPECIFICHEAT PLASTIC CYCLICHARDENING HYPERELASTIC HYPERFOAM \
     DEFORMATIONPLASTICITY SOLIDSECTION SHELLSECTION BEAMSECTION BEAMGENERALSECTION NODALTHICKNESS \
     NORMAL MEMBRANE ORIENTATION AMPLITUDE TRANSFORM EQUATION TIE \
-    SPRING GAP MPC RIGIDBODY DISTRIBUTINGCOUPLING \
+    SPRING GAP \
     PRE-TENSIONSECTION PHYSICALCONSTANTS INITIALCONDITIONS BOUNDARY STEP STATIC FREQUENCY \
     BUCKLE HEATTRANSFER COUPLEDTEMPERATURE-DISPLACEMENT \
     UNCOUPLEDTEMPERATURE-DISPLACEMENT CLOAD DLOAD DSLOAD \
@@ -185,7 +185,7 @@ pub(super) struct Reader {
     pub(super) materials: HashMap<String, u32>,
     pub(super) orientations: HashMap<String, u32>,
     pub(super) amplitudes: HashMap<String, crate::read::Amplitude>,
-    /// Springs and couplings that are described.
+    /// Springs that are described.
     pub(super) sprung: BTreeSet<u32>,
     /// Nodes whose first three components are the angles of another.
     pub(super) turning: HashMap<u32, u32>,
