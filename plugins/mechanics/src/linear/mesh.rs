@@ -320,7 +320,7 @@ impl Reader {
         let open = |(i, raw): (usize, &Raw)| {
             let open = matches!(raw.kind, Kind::Link(_)) && !self.sprung.contains(&(i as u32));
             open.then(|| {
-                let why = "has no *SPRING or *GAP";
+                let why = "has no *SPRING";
                 Fault::at(raw.line, format!("element {} {why}", raw.label))
             })
         };

@@ -1,18 +1,12 @@
 //! What a deck says, in SI and by positions.
 
-use std::{
-    collections::{BTreeMap, BTreeSet, HashMap},
-    f64::consts::PI,
-};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use glam::DVec3;
 
 use super::{
     constraint::Equation,
-    curve::Curved,
-    finite::Finite,
     law::{Elastic, Expansion, Table},
-    plastic::Hardening,
     shape::{Point, Shape},
 };
 use crate::{
@@ -35,8 +29,6 @@ pub struct Deck {
     pub(super) equations: Vec<Equation>,
     /// Steps from which on equations do not hold any more.
     pub(super) until: HashMap<usize, u32>,
-    /// Those of the equations that are others where displacements are large.
-    pub(super) curved: Vec<Curved>,
     /// Nodes that thicken flat elements, and the node that each has its temperature from.
     pub(super) twins: HashMap<u32, u32>,
     /// Nodes whose displacement is given as the mean of others.
@@ -78,66 +70,15 @@ pub(super) struct Cell {
 #[derive(Debug, Clone)]
 pub(super) struct Spring {
     pub(super) terms: Vec<(u32, f64)>,
-    /// The two nodes that it lies between, if it turns with the line between them where
-    /// displacements are large.
-    pub(super) ends: Option<[u32; 2]>,
     /// N/m.
     pub(super) stiffness: f64,
-    /// Elongation, m, and force, N, where these are not in proportion.
-    pub(super) law: Vec<(f64, f64)>,
-    pub(super) gap: Option<Gap>,
-}
-
-/// What bears once it has closed: F = K d (½ + atan(d/ε)/π) where it has by d, ε = π c/K. Far open,
-/// it is pulled by c.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Gap {
-    /// m.
-    pub(super) clearance: f64,
-    /// K, N/m.
-    pub(super) stiffness: f64,
-    /// c, N.
-    pub(super) pull: f64,
-}
-
-impl Gap {
-    /// Tension when it is so much wider, and by how much that grows.
-    fn force(&self, wider: f64) -> [f64; 2] {
-        let closed = -wider - self.clearance;
-        let at = closed * self.stiffness / (PI * self.pull);
-        // ½ + atan(d/ε)/π to all digits where it is far open, too.
-        let share = 1f64.atan2(-at) / PI;
-        let slope = share + at / (PI * (1.0 + at * at));
-        [-self.stiffness * closed * share, self.stiffness * slope]
-    }
 }
 
 impl Spring {
-    /// Its force when it is so much longer, and by how much that grows.
-    pub(super) fn force(&self, longer: f64) -> [f64; 2] {
-        if let Some(gap) = self.gap {
-            return gap.force(longer);
-        }
-        let i = self.law.partition_point(|p| p.0 <= longer);
-        match (i.checked_sub(1).and_then(|i| self.law.get(i)), self.law.get(i)) {
-            (Some(&(x, f)), Some(&(y, g))) => {
-                let slope = (g - f) / (y - x);
-                [f + slope * (longer - x), slope]
-            }
-            (Some(&(_, f)), None) | (None, Some(&(_, f))) => [f, 0.0],
-            (None, None) => [self.stiffness * longer, self.stiffness],
-        }
-    }
-
     /// Adds its stiffness, row by row.
     pub(super) fn resist(&self, k: &mut [f64]) {
-        self.outer(self.stiffness, k);
-    }
-
-    /// Adds a matrix of its terms, row by row.
-    pub(super) fn outer(&self, factor: f64, k: &mut [f64]) {
         for (row, a) in k.chunks_mut(self.terms.len()).zip(&self.terms) {
-            let force = factor * a.1;
+            let force = self.stiffness * a.1;
             row.iter_mut().zip(&self.terms).for_each(|(k, b)| *k += force * b.1);
         }
     }
@@ -149,9 +90,6 @@ pub(super) struct Material {
     pub(super) name: String,
     pub(super) elastic: Option<Elastic>,
     pub(super) expansion: Option<Expansion>,
-    pub(super) plastic: Option<Hardening>,
-    /// Its law where strains are not small, if it has no other.
-    pub(super) finite: Option<Finite>,
     /// kg/m³.
     pub(super) density: Option<Table<1>>,
     /// Along its own axes, W/(m·K).
@@ -266,8 +204,6 @@ pub(super) struct Step {
     /// From 1.
     pub(super) number: u32,
     pub(super) procedure: Procedure,
-    /// Whether equilibrium is where everything has gone to.
-    pub(super) large: bool,
     /// Components (in the node's own axes) and values, m.
     pub(super) held: BTreeMap<(u32, u8), f64>,
     /// Components that stay where the step before has left them.

@@ -26,11 +26,10 @@ use crate::read::{
 
 /// Cards that are read, without their spaces.
 const KNOWN: &str = "NODE ELEMENT NSET ELSET SURFACE MATERIAL ELASTIC DENSITY EXPANSION \
-    CONDUCTIVITY SPECIFICHEAT PLASTIC CYCLICHARDENING HYPERELASTIC HYPERFOAM \
-    DEFORMATIONPLASTICITY SOLIDSECTION SHELLSECTION BEAMSECTION BEAMGENERALSECTION NODALTHICKNESS \
+    CONDUCTIVITY SPECIFICHEAT \
+    SOLIDSECTION SHELLSECTION BEAMSECTION BEAMGENERALSECTION NODALTHICKNESS \
     NORMAL MEMBRANE ORIENTATION AMPLITUDE TRANSFORM EQUATION TIE \
-    SPRING GAP \
-    PRE-TENSIONSECTION PHYSICALCONSTANTS INITIALCONDITIONS BOUNDARY STEP STATIC FREQUENCY \
+    SPRING PHYSICALCONSTANTS INITIALCONDITIONS BOUNDARY STEP STATIC FREQUENCY \
     BUCKLE HEATTRANSFER COUPLEDTEMPERATURE-DISPLACEMENT \
     UNCOUPLEDTEMPERATURE-DISPLACEMENT CLOAD DLOAD DSLOAD \
     TEMPERATURE CFLUX DFLUX FILM RADIATE CHANGESOLIDSECTION ENDSTEP";
@@ -53,7 +52,6 @@ pub fn concerns(bytes: &[u8]) -> bool {
         !abaqus::knows(card)
             || card.is("PLASTIC")
             || card.get("ORIENTATION").is_some()
-            || (card.is("STEP") && card.word("NLGEOM").is_some_and(|word| word != "NO"))
             || (card.is("ELEMENT")
                 && !abaqus::knows_element(&card.word("TYPE").unwrap_or_default()))
     })
@@ -82,10 +80,6 @@ fn deck(bytes: &[u8], units: Units) -> Result<Deck, Fault> {
             reader.keep(read);
         });
         reader.fail()?;
-    }
-    for card in &cards {
-        let read = reader.cut(card);
-        reader.keep(read);
     }
     let made = reader.make();
     reader.keep(made);
@@ -134,25 +128,6 @@ pub(super) struct Raw {
     /// The solid that it has become.
     pub(super) cell: Option<u32>,
     pub(super) line: u32,
-}
-
-impl Raw {
-    /// Nodes of a face of a solid, or of a side of a plane.
-    pub(super) fn side(&self, face: u8) -> Vec<u32> {
-        let face = usize::from(face);
-        match self.kind {
-            Kind::Solid(shape) => {
-                shape.faces().nth(face).into_iter().flatten().map(|&i| self.nodes[i]).collect()
-            }
-            Kind::Flat(flat) => {
-                let (first, n) = (face.saturating_sub(2), flat.corners);
-                let mut side = vec![self.nodes[first], self.nodes[(first + 1) % n]];
-                side.extend(self.nodes.get(n + first));
-                side
-            }
-            Kind::Link(_) | Kind::Thin(_) => Vec::new(),
-        }
-    }
 }
 
 /// What an element is made of.
@@ -290,7 +265,8 @@ impl Reader {
             self.faults.push(card.fault(what));
         }
         if let Some(last) = self.faults.last_mut() {
-            last.reason += "; static loads, free vibrations, buckling and heat of elastic structures and metals are";
+            last.reason +=
+                "; static loads, free vibrations, buckling and heat of elastic structures are";
         }
     }
 

@@ -9,10 +9,9 @@ use super::{
     constraint::{Bound, Equation, Sum},
     element::{Element, Folded, Warmth},
     free::Free,
-    heat, large,
-    model::{Deck, Procedure, Pull, Spring, Step},
+    heat,
+    model::{Deck, Procedure, Pull, Step},
     modes,
-    plastic::Flow,
 };
 use crate::{
     sparse::{BlockMatrix, Constraints, Method, SolveError, solve},
@@ -128,10 +127,6 @@ pub(super) struct Past {
     /// Of every unknown; empty before the first step.
     pub(super) displacements: Vec<f64>,
     pub(super) stresses: Vec<Vec<Voigt>>,
-    /// What has flowed at every point; empty: nothing.
-    pub(super) flow: Vec<Vec<Flow>>,
-    /// Whether they are of equilibrium where everything has gone to.
-    pub(super) large: bool,
     /// Of every node.
     pub(super) temperatures: Vec<f64>,
 }
@@ -175,7 +170,6 @@ impl Deck {
                 let time = (!steady).then_some([first, duration]);
                 heat::solve(self, step, time, &mut past.temperatures, job)
             }
-            _ if step.large => large::solve(self, step, past, job),
             _ => System::new(self, step, past)?.solve(past, job),
         }
     }
@@ -189,14 +183,9 @@ impl Deck {
         past: &Past,
         job: &Job,
     ) -> Result<(System<'a>, Vec<f64>), LinearError> {
-        let (system, stiffness) = if stressed && past.large {
-            large::tangent(self, step, past, job)?
-        } else {
-            let system = System::new(self, step, past)?;
-            let stresses = if stressed { past.stresses.as_slice() } else { &[] };
-            let stiffness = system.stiff_under(stresses, job)?;
-            (system, stiffness)
-        };
+        let system = System::new(self, step, past)?;
+        let stresses = if stressed { past.stresses.as_slice() } else { &[] };
+        let stiffness = system.stiff_under(stresses, job)?;
         let (mass, _) = system.mass(job)?;
         let all = system.smallest(stiffness, &mass, count, job)?;
         Ok((system, all))
@@ -234,29 +223,16 @@ pub(super) struct System<'a> {
     warm: Vec<f64>,
     /// What is solved for, by elements and after them by springs.
     pub(super) free: Free<'a>,
-    /// Whether springs turn.
-    large: bool,
 }
 
 impl<'a> System<'a> {
     pub(super) fn new(deck: &'a Deck, step: &'a Step, past: &Past) -> Result<Self, LinearError> {
         let sums = sums(deck, step, &deck.constraints(step, past))?;
-        Ok(Self::of(deck, step, past, sums, false))
-    }
-
-    /// From what every unknown is by the free ones, with springs that turn or not.
-    pub(super) fn of(
-        deck: &'a Deck,
-        step: &'a Step,
-        past: &Past,
-        sums: Vec<Sum>,
-        large: bool,
-    ) -> Self {
         let warm = if step.warm.is_empty() { &past.temperatures } else { &step.warm };
         let count = deck.cells.len() + deck.springs.len();
-        let elements = (0..count).map(|e| unknowns(deck, e, large));
+        let elements = (0..count).map(|e| unknowns(deck, e));
         let free = Free::new(deck, sums, elements, |unknown| unknown / 3);
-        Self { deck, step, warm: warm.clone(), free, large }
+        Ok(Self { deck, step, warm: warm.clone(), free })
     }
 
     /// Temperatures of the nodes of an element.
@@ -305,7 +281,7 @@ impl<'a> System<'a> {
         job: &Job,
         fill: impl Fn(usize, &mut [f64], &mut [f64]) -> Result<(), Folded> + Sync,
     ) -> Result<(BlockMatrix<1>, Vec<f64>), LinearError> {
-        self.free.assembled(job, |e| unknowns(self.deck, e, self.large), fill)
+        self.free.assembled(job, |e| unknowns(self.deck, e), fill)
     }
 
     fn solve(self, past: &mut Past, job: &Job) -> Result<Solved, LinearError> {
@@ -313,7 +289,6 @@ impl<'a> System<'a> {
         let solved = self.finished(self.step.name.clone(), &all)?;
         past.displacements = all;
         past.stresses.clone_from(&solved.stresses);
-        past.large = false;
         Ok(solved)
     }
 
@@ -487,7 +462,7 @@ impl<'a> System<'a> {
     fn stresses(&self, all: &[f64]) -> Result<Vec<Vec<Voigt>>, LinearError> {
         let stress = |e: usize| {
             let own: Vec<f64> =
-                unknowns(self.deck, e, false).into_iter().map(|u| all[u as usize]).collect();
+                unknowns(self.deck, e).into_iter().map(|u| all[u as usize]).collect();
             let found = self.element(e).stresses(&own, &self.warmth(e), self.initial(e));
             found.map_err(|Folded| LinearError::Folded(self.deck.cells[e].label))
         };
@@ -507,13 +482,11 @@ pub(super) fn sums(
     Ok((0..3 * deck.nodes.len() as u32).map(|u| bound.of(u)).collect())
 }
 
-/// Unknowns of an element or, after the elements, of a spring, which may turn.
-pub(super) fn unknowns(deck: &Deck, e: usize, large: bool) -> Vec<u32> {
-    let all = |nodes: &[u32]| nodes.iter().flat_map(|&n| (0..3).map(move |i| 3 * n + i)).collect();
-    let Some(spring) = e.checked_sub(deck.cells.len()) else { return all(&deck.cells[e].nodes) };
-    match &deck.springs[spring] {
-        Spring { ends: Some(ends), .. } if large => all(ends),
-        Spring { terms, .. } => terms.iter().map(|t| t.0).collect(),
+/// Unknowns of an element or, after the elements, of a spring.
+fn unknowns(deck: &Deck, e: usize) -> Vec<u32> {
+    match e.checked_sub(deck.cells.len()) {
+        None => deck.cells[e].nodes.iter().flat_map(|&n| (0..3).map(move |i| 3 * n + i)).collect(),
+        Some(spring) => deck.springs[spring].terms.iter().map(|t| t.0).collect(),
     }
 }
 
@@ -530,32 +503,12 @@ impl Loads<'_> {
         warmth: &Warmth,
         force: &mut [f64],
     ) -> Result<(), Folded> {
-        let (pressures, pulls) = self.of(e);
+        let Some((pressures, pulls)) = self.by_cell.get(&(e as u32)) else { return Ok(()) };
         pressures.iter().for_each(|&(face, p)| element.pressure(usize::from(face), p, force));
-        self.pull(pulls, element, element, warmth, force)
-    }
-
-    /// Pressures and pulls of an element.
-    pub(super) fn of(&self, e: usize) -> (&[(u8, f64)], &[&Pull]) {
-        match self.by_cell.get(&(e as u32)) {
-            Some((pressures, pulls)) => (pressures.as_slice(), pulls.as_slice()),
-            None => (&[][..], &[][..]),
-        }
-    }
-
-    /// Forces on the mass of an element, where its nodes have gone to.
-    pub(super) fn pull(
-        &self,
-        pulls: &[&Pull],
-        element: &Element<'_>,
-        moved: &Element<'_>,
-        warmth: &Warmth,
-        force: &mut [f64],
-    ) -> Result<(), Folded> {
         let warm = warmth.now.iter().sum::<f64>() / warmth.now.len() as f64;
         let density = element.density(warm);
         for pull in pulls {
-            element.volume_force(|at| density * pull.at(moved.place(&at.jets)), force)?;
+            element.volume_force(|at| density * pull.at(at.place), force)?;
         }
         Ok(())
     }

@@ -38,8 +38,6 @@ pub(super) struct State {
     pub(super) heating: BTreeMap<Heated, Given<[f64; 2]>>,
     materials: BTreeMap<u32, u32>,
     pub(super) step: u32,
-    /// Whether displacements are large: from a step on until one says otherwise.
-    large: bool,
     open: Option<Open>,
     /// When the steps before it ended.
     time: f64,
@@ -157,7 +155,6 @@ impl Reader {
             Ok(interpolate(&amplitude.points, time).unwrap_or(1.0))
         };
         let mut step = Step { procedure, ..state.loads(factor)? };
-        step.large = state.large && procedure == Procedure::Static;
         if let Procedure::Heat { .. } | Procedure::Modes { heat: true, .. } = procedure {
             for (&node, given) in &state.temperatures {
                 step.temperatures.insert(node, given.value * factor(&given.amplitude)?);

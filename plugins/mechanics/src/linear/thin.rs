@@ -17,10 +17,10 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::{
     constraint::Equation,
-    curve::{Curve, terms},
     model::{Cell, Deck},
     read::{Kind, Reader, Section},
     shape::{GAUSS_2, Point, Shape, face_functions, face_places},
+    turn::{body, terms, turn},
 };
 use crate::read::{
     Fault,
@@ -354,9 +354,10 @@ impl Reader {
             }
             _ => vec![DMat3::IDENTITY],
         };
-        let widens = (3 * stretch..).zip(widens).collect();
+        let widens: Vec<(u32, DMat3)> = (3 * stretch..).zip(widens).collect();
         self.turning.insert(node, turning);
-        self.bound(Curve::Body { reference: node, turning, unit: 1.0, nodes, widens }, 0);
+        let equations = body(&self.deck.nodes, [node, turning], &nodes, &widens);
+        self.deck.equations.extend(equations);
         if extent == 1 {
             // What lies on a line says nothing of turning about it.
             let terms = terms(&[(turning, axes[0])]);
@@ -389,9 +390,9 @@ impl Reader {
         // About the node's own axes: mean angles are not a vector.
         let own = self.deck.turned.get(&node).map(|frame| frame.map(DVec3::from_array));
         for (i, axis) in (0..).zip(own.unwrap_or(DVec3::AXES)) {
-            let (nodes, angle) = (ring.outer.clone(), 3 * turning + i);
             // Two nodes along an axis say nothing of a turn about it.
-            self.bound(Curve::Turn { nodes, axis, angle, unit: 1.0 }, row.line);
+            let equation = turn(&self.deck.nodes, &ring.outer, axis, 3 * turning + i, row.line);
+            self.deck.equations.extend(equation);
         }
         self.turning.insert(node, turning);
         Some(turning)

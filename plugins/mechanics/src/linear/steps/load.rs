@@ -20,7 +20,7 @@ use crate::{
         abaqus::card::{Card, Row},
         quote,
     },
-    tensor::{self, Voigt},
+    tensor,
 };
 
 impl Reader {
@@ -276,30 +276,16 @@ impl Reader {
                 }
                 Ok(())
             }
-            "STRESS" => {
-                self.at_points(card, |reader, _, v| tensor::scale(&v, reader.units.stress()))
+            "STRESS" => self.stress(card),
+            _ => {
+                Err(card
+                    .fault(format!("TYPE={}: TEMPERATURE and STRESS are supported", quote(&kind))))
             }
-            "PLASTIC STRAIN" | "PLASTICSTRAIN" => self.at_points(card, |reader, e, mut v| {
-                (3..6).for_each(|i| v[i] *= 2.0);
-                let cell = &reader.deck.cells[e as usize];
-                let law = reader.deck.materials[cell.material as usize].elastic.as_ref();
-                let cold = cell.nodes.first().map_or(0.0, |&n| reader.deck.cold[n as usize]);
-                let law = law.map_or([[0.0; 6]; 6], |l| l.stiffness(cold));
-                tensor::scale(&tensor::apply(&law, &v), -1.0)
-            }),
-            _ => Err(card.fault(format!(
-                "TYPE={}: TEMPERATURE, STRESS and PLASTIC STRAIN are supported",
-                quote(&kind)
-            ))),
         }
     }
 
     /// Element, point, and six numbers in Abaqus' order.
-    fn at_points(
-        &mut self,
-        card: &Card<'_>,
-        stress: impl Fn(&Self, u32, Voigt) -> Voigt,
-    ) -> Result<(), Fault> {
+    fn stress(&mut self, card: &Card<'_>) -> Result<(), Fault> {
         for row in card.rows() {
             let what = "element, point, 11, 22, 33, 12, 13, 23";
             let [element, point, numbers @ ..] = row.exactly::<8>(what)?;
@@ -312,7 +298,7 @@ impl Reader {
                 let point = point.parse::<u32>().ok().filter(|p| (1..=points as u32).contains(p));
                 let point = point
                     .ok_or_else(|| row.fault(format!("a point is a number from 1 to {points}")))?;
-                let stress = stress(self, element, given);
+                let stress = tensor::scale(&given, self.units.stress());
                 self.deck.stress.insert((element, point - 1), stress);
             }
         }

@@ -19,8 +19,10 @@ pub(super) fn begin(card: &Card<'_>, state: &mut State) -> Result<(), Fault> {
         procedure: None,
         coupled: false,
     });
-    if let Some(word) = card.word("NLGEOM") {
-        state.large = word != "NO";
+    if card.word("NLGEOM").is_some_and(|word| word != "NO") {
+        return Err(card.fault(
+            "*STEP, NLGEOM: large displacements are not computed; take NLGEOM out if small ones will do",
+        ));
     }
     card.only(&["NAME", "INC", "AMPLITUDE", "NLGEOM", "PERTURBATION"])
 }
@@ -57,8 +59,8 @@ pub(super) fn procedure(card: &Card<'_>, name: &str, state: &mut State) -> Resul
         }
         "COUPLEDTEMPERATURE-DISPLACEMENT" | "UNCOUPLEDTEMPERATURE-DISPLACEMENT" => {
             card.only(&["STEADY STATE", "SOLVER", "DIRECT", "DELTMX"])?;
-            if !has("STEADY STATE") || state.large || !state.warm.is_empty() {
-                let what = "is computed with STEADY STATE, and without NLGEOM and *TEMPERATURE";
+            if !has("STEADY STATE") || !state.warm.is_empty() {
+                let what = "is computed with STEADY STATE, and without *TEMPERATURE";
                 return Err(card.fault(format!("*{} {what}", card.name)));
             }
             open.duration = duration(card, &numbers)?;
