@@ -78,7 +78,7 @@ fn bodies_that_nothing_holds_vibrate() {
 #[test]
 fn blocks_grow_as_warm_as_they_settle() {
     let deck = cube(
-        "*STEP\n*COUPLED TEMPERATURE-DISPLACEMENT,STEADY STATE\n*BOUNDARY\nLOW,11,11,100.\n*END STEP\n",
+        "*STEP\n*HEAT TRANSFER,STEADY STATE\n*BOUNDARY\nLOW,11,11,100.\n*END STEP\n*STEP\n*STATIC\n*END STEP\n",
     );
     let solved = solve(&deck);
     near(*solved[0].temperatures.last().unwrap(), 100.0, 1e-9);

@@ -15,7 +15,6 @@ use super::{
     free::Free,
     law::Table,
     model::{Cell, Deck, Heated, Heating, Step},
-    modes::{self, Failed},
     shape::Shape,
     solve::{LinearError, Solved},
 };
@@ -63,25 +62,6 @@ pub(super) fn solve(
         unknowns: body.free.count(),
         ..Solved::default()
     })
-}
-
-/// The smallest rates at which differences of temperature decay.
-pub(super) fn modes(
-    deck: &Deck,
-    step: &Step,
-    count: usize,
-    job: &Job,
-) -> Result<Solved, LinearError> {
-    let body = Body::new(deck, step);
-    let cold = &deck.cold;
-    let (conduction, _) = body.assembled(job, |e, k, f| body.flow(e, cold, k, f))?;
-    let (capacity, _) = body.assembled(job, |e, m, _| body.capacity(e, cold, m))?;
-    let eigenvalues = modes::smallest(conduction, &capacity, count, job).map_err(|e| match e {
-        Failed::Solve(error) => error.into(),
-        _ => body.lost("eigenvalues"),
-    })?;
-    let unknowns = body.free.count();
-    Ok(Solved { name: step.name.clone(), eigenvalues, unknowns, ..Solved::default() })
 }
 
 /// What is heated in a step.

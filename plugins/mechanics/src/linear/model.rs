@@ -168,12 +168,11 @@ pub(super) enum Procedure {
         /// s.
         duration: f64,
     },
-    /// The smallest eigenvalues, of motion or of heat.
+    /// The smallest eigenvalues of motion.
     Modes {
         count: usize,
         /// With the stresses of the step before.
         stressed: bool,
-        heat: bool,
     },
     /// The smallest factors of the loads at which the structure buckles.
     Buckling { count: usize },

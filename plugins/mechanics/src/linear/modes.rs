@@ -1,5 +1,4 @@
-//! The smallest eigenvalues λ of K φ = λ G φ: squares of frequencies (G the mass), rates of decay
-//! (G the capacity of heat), factors of buckling (G what stresses take from the stiffness).
+//! The smallest eigenvalues λ of K φ = λ G φ: squares of frequencies (G the mass), factors of buckling (G what stresses take from the stiffness).
 //!
 //! K⁻¹ G is symmetric in the scalar product of K. Its largest eigenvalues 1/λ are taken from a
 //! Krylov space of blocks (Golub and Underwood 1977), which finds as many equal ones as a block

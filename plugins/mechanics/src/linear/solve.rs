@@ -29,8 +29,7 @@ pub struct Solved {
     pub stresses: Vec<Vec<Voigt>>,
     /// Of the nodes that the deck names, where the step is one of heat.
     pub temperatures: Vec<f64>,
-    /// The smallest, ascending: squares of angular frequencies, 1/s²; rates at which temperatures
-    /// decay, 1/s; factors at which loads buckle.
+    /// The smallest, ascending: squares of angular frequencies, 1/s²; factors at which loads buckle.
     pub eigenvalues: Vec<f64>,
     /// Unknowns that were solved for.
     pub unknowns: usize,
@@ -157,8 +156,7 @@ impl Deck {
 
     fn step(&self, step: &Step, past: &mut Past, job: &Job) -> Result<Solved, LinearError> {
         match step.procedure {
-            Procedure::Modes { count, heat: true, .. } => heat::modes(self, step, count, job),
-            Procedure::Modes { count, stressed, .. } => {
+            Procedure::Modes { count, stressed } => {
                 let (system, all) = self.vibrating(step, count, stressed, past, job)?;
                 Ok(system.eigenvalues(all))
             }

@@ -49,8 +49,6 @@ struct Open {
     duration: f64,
     perturbs: bool,
     procedure: Option<Procedure>,
-    /// Whether displacements follow the temperatures.
-    coupled: bool,
 }
 
 impl State {
@@ -98,21 +96,14 @@ impl Reader {
     /// Everything that has an order.
     pub(super) fn history(&mut self, card: &Card<'_>, state: &mut State) -> Result<(), Fault> {
         let name = plain(card);
-        const WITHIN: &str = "STATIC FREQUENCY BUCKLE HEATTRANSFER \
-            COUPLEDTEMPERATURE-DISPLACEMENT UNCOUPLEDTEMPERATURE-DISPLACEMENT \
-            ENDSTEP CLOAD DLOAD DSLOAD TEMPERATURE CFLUX \
-            DFLUX FILM RADIATE CHANGESOLIDSECTION";
+        const WITHIN: &str = "STATIC FREQUENCY BUCKLE HEATTRANSFER ENDSTEP CLOAD DLOAD DSLOAD \
+            TEMPERATURE CFLUX DFLUX FILM RADIATE CHANGESOLIDSECTION";
         if WITHIN.split_ascii_whitespace().any(|w| w == name) && state.open.is_none() {
             return Err(card.fault(format!("*{} must stand in a *STEP", card.name)));
         }
         match name.as_str() {
             "STEP" => begin(card, state),
-            "STATIC"
-            | "FREQUENCY"
-            | "BUCKLE"
-            | "HEATTRANSFER"
-            | "COUPLEDTEMPERATURE-DISPLACEMENT"
-            | "UNCOUPLEDTEMPERATURE-DISPLACEMENT" => procedure(card, &name, state),
+            "STATIC" | "FREQUENCY" | "BUCKLE" | "HEATTRANSFER" => procedure(card, &name, state),
             "ENDSTEP" => self.close(state),
             "EQUATION" => self.end_equations(card, state),
             "BOUNDARY" => self.boundary(card, state),
@@ -130,10 +121,6 @@ impl Reader {
     fn close(&mut self, state: &mut State) -> Result<(), Fault> {
         let Some(open) = state.open.take() else { return Ok(()) };
         self.end(open.procedure.unwrap_or_default(), &open, state)?;
-        if open.coupled {
-            // What the temperatures of the step that has just been added do.
-            self.end(Procedure::Static, &open, state)?;
-        }
         state.time += open.duration;
         Ok(())
     }
@@ -155,7 +142,7 @@ impl Reader {
             Ok(interpolate(&amplitude.points, time).unwrap_or(1.0))
         };
         let mut step = Step { procedure, ..state.loads(factor)? };
-        if let Procedure::Heat { .. } | Procedure::Modes { heat: true, .. } = procedure {
+        if let Procedure::Heat { .. } = procedure {
             for (&node, given) in &state.temperatures {
                 step.temperatures.insert(node, given.value * factor(&given.amplitude)?);
             }

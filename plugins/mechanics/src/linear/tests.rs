@@ -464,6 +464,8 @@ fn what_is_not_computed_is_refused_by_its_name() {
         "HYPERELASTIC",
         "HYPERFOAM",
         "DEFORMATION PLASTICITY",
+        "COUPLED TEMPERATURE-DISPLACEMENT",
+        "UNCOUPLED TEMPERATURE-DISPLACEMENT",
     ] {
         let line = refusal(&format!("*NODE\n1,0,0\n*{card}\n"));
         assert!(line.contains(&format!("deck.inp:3: *{card} is not computed")), "{line}");
@@ -489,6 +491,7 @@ fn what_is_not_computed_is_refused_by_its_name() {
         ("*TIE,", "*TIE,CYCLIC SYMMETRY,", "*TIE: parameter \"CYCLIC SYMMETRY\""),
         ("*CLOAD,", "*CLOAD,LOAD CASE=2,", "*CLOAD: parameter \"LOAD CASE\""),
         ("*CLOAD,", "*CLOAD,TIME DELAY=1.,", "*CLOAD: parameter \"TIME DELAY\""),
+        ("*STATIC\n", "*HEAT TRANSFER,FREQUENCY\n", "*HEAT TRANSFER: parameter \"FREQUENCY\""),
         ("TYPE=STRESS", "TYPE=PLASTIC STRAIN", "TYPE=\"PLASTIC STRAIN\""),
     ] {
         let line = refusal(&good.replacen(old, new, 1));

@@ -26,12 +26,11 @@ impl Reader {
                 None => Ok(()),
             }
         };
-        let heats =
-            matches!(procedure, Procedure::Heat { .. } | Procedure::Modes { heat: true, .. });
+        let heats = matches!(procedure, Procedure::Heat { .. });
         if !heats {
             lacks(|m| m.elastic.is_some(), "*ELASTIC")?;
         }
-        if let Procedure::Modes { heat: false, .. } = procedure {
+        if let Procedure::Modes { .. } = procedure {
             lacks(|m| m.density.is_some(), "*DENSITY")?;
         }
         if let Procedure::Modes { stressed: true, .. } = procedure {

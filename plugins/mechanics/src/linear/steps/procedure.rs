@@ -17,7 +17,6 @@ pub(super) fn begin(card: &Card<'_>, state: &mut State) -> Result<(), Fault> {
         duration: 1.0,
         perturbs: card.get("PERTURBATION").is_some(),
         procedure: None,
-        coupled: false,
     });
     if card.word("NLGEOM").is_some_and(|word| word != "NO") {
         return Err(card.fault(
@@ -34,9 +33,6 @@ pub(super) fn procedure(card: &Card<'_>, name: &str, state: &mut State) -> Resul
         return Err(card.fault("a step has one procedure: *END STEP is missing"));
     }
     let numbers = all_numbers(card)?;
-    let has = |parameter: &str| card.get(parameter).is_some();
-    let modes =
-        |stressed, heat| Ok(Procedure::Modes { count: many(card, &numbers)?, stressed, heat });
     let procedure = match name {
         "STATIC" if open.perturbs => {
             return Err(card.fault("*STATIC in a step of PERTURBATION is not computed"));
@@ -48,7 +44,7 @@ pub(super) fn procedure(card: &Card<'_>, name: &str, state: &mut State) -> Resul
         }
         "FREQUENCY" => {
             card.only(&["SOLVER", "STORAGE", "GLOBAL"])?;
-            modes(open.perturbs, false)?
+            Procedure::Modes { count: many(card, &numbers)?, stressed: open.perturbs }
         }
         "BUCKLE" if open.perturbs => {
             return Err(card.fault("*BUCKLE in a step of PERTURBATION is not computed"));
@@ -57,38 +53,15 @@ pub(super) fn procedure(card: &Card<'_>, name: &str, state: &mut State) -> Resul
             card.only(&["SOLVER"])?;
             Procedure::Buckling { count: many(card, &numbers)? }
         }
-        "COUPLEDTEMPERATURE-DISPLACEMENT" | "UNCOUPLEDTEMPERATURE-DISPLACEMENT" => {
-            card.only(&["STEADY STATE", "SOLVER", "DIRECT", "DELTMX"])?;
-            if !has("STEADY STATE") || !state.warm.is_empty() {
-                let what = "is computed with STEADY STATE, and without *TEMPERATURE";
-                return Err(card.fault(format!("*{} {what}", card.name)));
-            }
-            open.duration = duration(card, &numbers)?;
-            open.coupled = true;
-            Procedure::Heat { steady: true, first: open.duration, duration: open.duration }
-        }
         _ => {
-            const ALLOWED: [&str; 7] = [
-                "STEADY STATE",
-                "FREQUENCY",
-                "SOLVER",
-                "DIRECT",
-                "DELTMX",
-                "TIME RESET",
-                "STORAGE",
-            ];
-            card.only(&ALLOWED)?;
-            if has("FREQUENCY") {
-                modes(false, true)?
-            } else {
-                open.duration = duration(card, &numbers)?;
-                let first = numbers.first().map_or(open.duration, |f| f.min(open.duration));
-                if first.is_nan() || first <= 0.0 {
-                    return Err(card.fault(format!("a first increment of {first} s")));
-                }
-                let steady = has("STEADY STATE");
-                Procedure::Heat { steady, first, duration: open.duration }
+            card.only(&["STEADY STATE", "SOLVER", "DIRECT", "DELTMX", "TIME RESET"])?;
+            open.duration = duration(card, &numbers)?;
+            let first = numbers.first().map_or(open.duration, |f| f.min(open.duration));
+            if first.is_nan() || first <= 0.0 {
+                return Err(card.fault(format!("a first increment of {first} s")));
             }
+            let steady = card.get("STEADY STATE").is_some();
+            Procedure::Heat { steady, first, duration: open.duration }
         }
     };
     open.procedure = Some(procedure);
