@@ -51,7 +51,6 @@ pub(super) fn solve(
     for (&node, &value) in &step.temperatures {
         temperatures[node as usize] = value;
     }
-    deck.spread(temperatures);
     match time {
         None => *temperatures = body.settled(temperatures, None, job)?,
         Some(times) => body.march(temperatures, times, job)?,
@@ -76,10 +75,8 @@ struct Body<'a> {
 impl<'a> Body<'a> {
     fn new(deck: &'a Deck, step: &'a Step) -> Self {
         let sum = |node: u32| {
-            // Flat elements have the temperature of their middle.
-            let owner = deck.twins.get(&node).copied().unwrap_or(node);
-            let is_held = step.temperatures.contains_key(&owner);
-            let terms = if is_held { Vec::new() } else { vec![(owner, 1.0)] };
+            let is_held = step.temperatures.contains_key(&node);
+            let terms = if is_held { Vec::new() } else { vec![(node, 1.0)] };
             // Newton's method asks for changes, which are none where it is held.
             Sum { terms, constant: 0.0 }
         };
@@ -126,7 +123,6 @@ impl<'a> Body<'a> {
             let found = direct(&matrix, &rhs, &none, Method::Direct, 1e-7, job);
             let change = found.map_err(|error| self.explained(error))?.x;
             self.free.order().iter().zip(&change).for_each(|(&n, d)| now[n as usize] += d);
-            self.deck.spread(&mut now);
             let largest = |all: &[f64]| all.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
             if linear || largest(&change) <= SETTLED * largest(&now) {
                 return Ok(now);

@@ -208,12 +208,6 @@ impl Reader {
         if set.iter().any(is_bar) && all_numbers(card)?.first().copied().unwrap_or(0.0) <= 0.0 {
             return Err(card.fault("bars need the area of their section, above 0"));
         }
-        if thickness.is_nan() || thickness <= 0.0 {
-            let flat = |e: &u32| matches!(self.raw[*e as usize].kind, Kind::Flat(_));
-            if set.iter().any(flat) {
-                return Err(card.fault("the thickness must be above 0"));
-            }
-        }
         self.assign(card, &section, fits)
     }
 

@@ -19,17 +19,17 @@ use crate::{
 pub struct Deck {
     /// m.
     pub(super) nodes: Vec<DVec3>,
-    /// Numbers of the nodes that the deck has; nodes that thicken flat elements follow.
+    /// Numbers of the nodes that the deck has; nodes around those of beams and shells follow.
     pub(super) labels: Vec<u32>,
     pub(super) cells: Vec<Cell>,
     pub(super) materials: Vec<Material>,
     pub(super) orientations: Vec<Orientation>,
     pub(super) springs: Vec<Spring>,
-    /// What holds in every step: equations, ties, thickened elements.
+    /// What holds in every step: equations, ties, beams and shells.
     pub(super) equations: Vec<Equation>,
     /// Steps from which on equations do not hold any more.
     pub(super) until: HashMap<usize, u32>,
-    /// Nodes that thicken flat elements, and the node that each has its temperature from.
+    /// Nodes around those of beams and shells, and the node that each has its temperature from.
     pub(super) twins: HashMap<u32, u32>,
     /// Nodes whose displacement is given as the mean of others.
     pub(super) means: HashMap<u32, Vec<(u32, f64)>>,
@@ -233,15 +233,15 @@ impl Deck {
         self.cells.iter().map(|c| c.label)
     }
 
-    /// Its elements as a picture, whose regions are their materials; none where planes, beams or
-    /// shells have become solids with nodes that the deck does not name.
+    /// Its elements as a picture, whose regions are their materials; none where beams or shells
+    /// have become solids with nodes that the deck does not name.
     #[must_use]
     pub fn grid(&self) -> Option<Grid<'_>> {
         let cells = self.cells.iter().map(|c| (c.shape.vtk(), c.nodes.as_slice(), c.material));
         (self.nodes.len() == self.labels.len()).then(|| Grid::of(&self.nodes, cells))
     }
 
-    /// Gives nodes that thicken flat elements the temperature of their own.
+    /// Gives nodes around those of beams and shells the temperature of these.
     pub(super) fn spread(&self, temperatures: &mut [f64]) {
         for (&twin, &node) in &self.twins {
             temperatures[twin as usize] = temperatures[node as usize];

@@ -8,7 +8,6 @@ use std::{
 use glam::DVec3;
 
 use super::{
-    flat::Flat,
     link::Link,
     model::Deck,
     shape::Shape,
@@ -110,7 +109,6 @@ fn deck(bytes: &[u8], units: Units) -> Result<Deck, Fault> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Kind {
     Solid(Shape),
-    Flat(Flat),
     Link(Link),
     Thin(Thin),
 }
@@ -132,7 +130,7 @@ pub(super) struct Raw {
 pub(super) struct Section {
     pub(super) material: u32,
     pub(super) orientation: Option<u32>,
-    /// Of planes and shells, m.
+    /// Of shells, m; of bars, the area of their section.
     pub(super) thickness: f64,
     pub(super) profile: Profile,
 }

@@ -43,7 +43,7 @@ pub enum LinearError {
     Contradiction {
         /// Name of the step.
         step: String,
-        /// Line of the deck; 0: of a tie or a flat element.
+        /// Line of the deck; 0: of a beam or a shell.
         line: u32,
     },
     /// An element that is flat or turned inside out.

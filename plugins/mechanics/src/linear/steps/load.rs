@@ -1,17 +1,14 @@
 //! Supports and loads, temperatures and initial stress.
 
-use std::collections::BTreeSet;
-
 use glam::DVec3;
 
 use super::{Given, State, clear};
 use crate::{
     linear::{
-        flat::{Plane, SLICE},
         law::ORDER,
         mesh::name_of,
         model::Pull,
-        read::{Kind, Raw, Reader, Surface},
+        read::{Kind, Reader, Surface},
         thin::Thin,
         warm::is_temperature,
     },
@@ -118,17 +115,14 @@ impl Reader {
         clear(card, state.step, &mut state.forces, |_| true)?;
         let amplitude = name_of(card, "AMPLITUDE")?;
         let forces = &mut state.forces;
-        let around = self.around_nodes();
         for row in card.rows() {
             let [target, direction, value] = row.exactly("node or set, component, force")?;
             let (direction, value) = (component(direction, row)?, row.number(value)?);
             for node in self.some_nodes(target, row)? {
-                // A force on what is axially symmetric is that on the whole circle.
-                let share = if around.contains(&node) { SLICE / 360.0 } else { 1.0 };
                 let (at, _) = self.motion(node, direction, None, row)?;
                 // A moment is of newtons and lengths.
                 let unit = if direction < 3 { 1.0 } else { self.units.length() };
-                let mut value = value * share * unit;
+                let mut value = value * unit;
                 if let Some(old) = forces.get(&at)
                     && old.step == state.step
                 {
@@ -139,19 +133,6 @@ impl Reader {
             }
         }
         Ok(())
-    }
-
-    /// Nodes of planes where some are axially symmetric: all of them are in the slice then.
-    pub(in crate::linear) fn around_nodes(&self) -> BTreeSet<u32> {
-        let is_around = self.is_around();
-        let flat = |r: &&Raw| is_around && matches!(r.kind, Kind::Flat(_));
-        self.raw.iter().filter(flat).flat_map(|r| r.nodes.iter().copied()).collect()
-    }
-
-    /// Whether a slice stands for what is axially symmetric.
-    pub(in crate::linear) fn is_around(&self) -> bool {
-        let around = |kind| matches!(kind, Kind::Flat(flat) if flat.plane == Plane::Around);
-        self.raw.iter().any(|r| around(r.kind))
     }
 
     pub(super) fn dload(
