@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
 
 use super::{
     law::Elastic,
-    model::{Cell, Deck, Material, Orientation, Step},
+    model::{Cell, Deck, Material, Orientation},
     shape::{Jet, Point, Shape, face_functions, face_places},
 };
 use crate::tensor::{self, Frame, Tangent, Voigt};
@@ -38,7 +38,6 @@ pub(super) struct Warmth {
 /// An element with the places of its nodes.
 #[derive(Clone)]
 pub(super) struct Element<'a> {
-    deck: &'a Deck,
     cell: &'a Cell,
     material: &'a Material,
     orientation: Option<&'a Orientation>,
@@ -46,14 +45,11 @@ pub(super) struct Element<'a> {
 }
 
 impl<'a> Element<'a> {
-    /// A cell, of what a step says that it is made of.
-    pub(super) fn new(deck: &'a Deck, step: &Step, e: usize) -> Self {
+    pub(super) fn new(deck: &'a Deck, e: usize) -> Self {
         let cell = &deck.cells[e];
-        let material = step.materials.get(&(e as u32)).unwrap_or(&cell.material);
         Self {
-            deck,
             cell,
-            material: &deck.materials[*material as usize],
+            material: &deck.materials[cell.material as usize],
             orientation: cell.orientation.map(|o| &deck.orientations[o as usize]),
             places: cell.nodes.iter().map(|&n| deck.nodes[n as usize]).collect(),
         }
@@ -112,17 +108,6 @@ impl<'a> Element<'a> {
         }
     }
 
-    /// Material and axes at a point of integration.
-    fn matter(&self, point: usize) -> (&Material, Option<&Orientation>) {
-        match self.cell.layers.get(point) {
-            None => (self.material, self.orientation),
-            Some(&(material, axes)) => (
-                &self.deck.materials[material as usize],
-                axes.map(|o| &self.deck.orientations[o as usize]),
-            ),
-        }
-    }
-
     /// The axes of its material there, as rows.
     pub(super) fn frame(&self, place: DVec3) -> Option<Frame> {
         self.orientation.map(|o| o.frame(place))
@@ -131,11 +116,10 @@ impl<'a> Element<'a> {
     /// The law at a point of integration, and the strain of free swelling there.
     fn local(&self, point: usize, at: &At, warmth: &Warmth) -> (Tangent, Voigt) {
         let [now, cold] = self.warmth(point, at, warmth);
-        let (material, axes) = self.matter(point);
-        let law = material.elastic.as_ref().map_or([[0.0; 6]; 6], |l| l.stiffness(now));
-        let free = material.expansion.as_ref().map_or([0.0; 3], |l| l.strain(now, cold));
+        let law = self.material.elastic.as_ref().map_or([[0.0; 6]; 6], |l| l.stiffness(now));
+        let free = self.material.expansion.as_ref().map_or([0.0; 3], |l| l.strain(now, cold));
         let free = [free[0], free[1], free[2], 0.0, 0.0, 0.0];
-        let (law, free) = match axes.map(|o| o.frame(at.place)) {
+        let (law, free) = match self.frame(at.place) {
             None => (law, free),
             Some(frame) => (
                 tensor::rotate_tangent(&law, &frame),
@@ -319,15 +303,11 @@ impl<'a> Element<'a> {
         jets.iter().zip(&self.places).map(|(j, &x)| j.value * x).sum()
     }
 
-    /// Forces of what acts on every piece of its volume, N/m³ by point.
-    pub(super) fn volume_force(
-        &self,
-        density: impl Fn(&At) -> DVec3,
-        f: &mut [f64],
-    ) -> Result<(), Folded> {
+    /// Forces of what acts on every piece of its volume, N/m³.
+    pub(super) fn volume_force(&self, density: DVec3, f: &mut [f64]) -> Result<(), Folded> {
         for (natural, weight) in self.points() {
             let at = self.strained(natural, weight)?;
-            let force = at.volume * density(&at);
+            let force = at.volume * density;
             for (jet, f) in at.jets.iter().zip(f.as_chunks_mut::<3>().0) {
                 f.iter_mut().zip(force.to_array()).for_each(|(f, q)| *f += jet.value * q);
             }

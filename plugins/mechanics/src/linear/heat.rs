@@ -151,7 +151,6 @@ impl<'a> Body<'a> {
                 && all.into_iter().flatten().all(Table::is_constant)
         };
         self.deck.cells.iter().all(constant)
-            && self.step.materials.is_empty()
             && self.step.heating.keys().all(|h| h.0 != Heating::Radiation)
     }
 
@@ -210,7 +209,7 @@ impl<'a> Body<'a> {
 
     /// Tangent and what flows into the nodes: conduction and everything that heats the element.
     fn flow(&self, e: usize, all: &[f64], k: &mut [f64], f: &mut [f64]) -> Result<(), Folded> {
-        let (element, own) = (Element::new(self.deck, self.step, e), self.own(e, all));
+        let (element, own) = (Element::new(self.deck, e), self.own(e, all));
         let n = own.len();
         let loads = self.loads.get(&(e as u32)).map_or(&[][..], Vec::as_slice);
         let volume: f64 = loads.iter().filter(|l| l.0.0 == Heating::Volume).map(|l| l.1[0]).sum();
@@ -285,7 +284,7 @@ impl<'a> Body<'a> {
 
     /// ∫ ρc N Nᵀ.
     fn capacity(&self, e: usize, all: &[f64], m: &mut [f64]) -> Result<(), Folded> {
-        let (element, own) = (Element::new(self.deck, self.step, e), self.own(e, all));
+        let (element, own) = (Element::new(self.deck, e), self.own(e, all));
         let n = own.len();
         for (natural, weight) in warmed(&element).fine_points() {
             let at = element.at(natural, weight)?;

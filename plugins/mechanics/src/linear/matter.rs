@@ -174,18 +174,6 @@ impl Reader {
             "SHELLSECTION" => self.shell_section(card),
             "BEAMSECTION" | "BEAMGENERALSECTION" => self.beam_section(card),
             "NORMAL" => self.normal(card),
-            "NODALTHICKNESS" => {
-                // No section asks for it, and CalculiX leaves it out as well.
-                self.deck.notes.push(format!(
-                    "line {}: *NODAL THICKNESS says nothing: thicknesses are those of sections",
-                    card.line
-                ));
-                Ok(())
-            }
-            // A set without elements needs no section.
-            "MEMBRANE" if self.element_sets.contains_key(&card.need("ELSET")?) => {
-                Err(card.fault("*MEMBRANE is not computed"))
-            }
             _ => Ok(()),
         }
     }
@@ -247,7 +235,7 @@ impl Reader {
     }
 
     fn shell_section(&mut self, card: &Card<'_>) -> Result<(), Fault> {
-        card.only(&["ELSET", "MATERIAL", "ORIENTATION", "OFFSET", "COMPOSITE"])?;
+        card.only(&["ELSET", "MATERIAL", "ORIENTATION", "OFFSET"])?;
         let offset = match card.word("OFFSET").as_deref() {
             None => 0.0,
             Some("SPOS") => -0.5,
@@ -257,42 +245,19 @@ impl Reader {
                 found.ok_or_else(|| card.fault("OFFSET is a number, SPOS or SNEG"))?
             }
         };
-        let mut layers = Vec::new();
-        let mut thickness = 0.0;
-        for row in card.rows() {
-            let words: Vec<&str> = row.fields().collect();
-            let own = row.number(words[0])? * self.units.length();
-            if own.is_nan() || own <= 0.0 {
-                return Err(row.fault("a thickness must be above 0"));
-            }
-            thickness += own;
-            if card.get("COMPOSITE").is_none() {
-                continue;
-            }
-            let word = |i: usize| words.get(i).copied().filter(|w| !w.is_empty());
-            let material = word(2).ok_or_else(|| row.fault("needed are: thickness, , material"))?;
-            let axes = word(3).map(|name| self.axes_of(card, name)).transpose()?;
-            layers.push((own, self.named_material(card, material)?, axes));
+        let row =
+            card.one_row()?.ok_or_else(|| card.fault("*SHELL SECTION needs its thickness"))?;
+        let thickness = row.number(row.fields().next().unwrap_or_default())? * self.units.length();
+        if thickness.is_nan() || thickness <= 0.0 {
+            return Err(row.fault("a thickness must be above 0"));
         }
-        if thickness == 0.0 {
-            return Err(card.fault("*SHELL SECTION needs its thickness"));
-        }
-        let material = match layers.first() {
-            Some(layer) => layer.1,
-            None => self.named_material(card, &card.need("MATERIAL")?)?,
-        };
-        let layered = !layers.is_empty();
         let section = Section {
-            material,
+            material: self.named_material(card, &card.need("MATERIAL")?)?,
             orientation: self.named_orientation(card)?,
             thickness,
-            profile: Profile::Shell { offset, layers },
+            profile: Profile::Shell { offset },
         };
-        self.assign(card, &section, |kind| match kind {
-            // Layers have eight points each.
-            Kind::Thin(Thin::Shell { shape, .. }) => !layered || shape == Shape::Hex20Reduced,
-            _ => false,
-        })
+        self.assign(card, &section, |kind| matches!(kind, Kind::Thin(Thin::Shell { .. })))
     }
 
     fn beam_section(&mut self, card: &Card<'_>) -> Result<(), Fault> {

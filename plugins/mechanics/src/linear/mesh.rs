@@ -311,7 +311,6 @@ fn whole(raw: &Raw, shape: Shape, nodes: Vec<u32>, section: &Section) -> Cell {
         orientation: section.orientation,
         across: 0.0,
         points: Vec::new(),
-        layers: Vec::new(),
     }
 }
 

@@ -10,7 +10,7 @@
 //! | elements | C3D4, C3D6, C3D8, C3D8I, C3D8R (with CalculiX' stiffness against hourglasses: they bend far too much with one or two across), C3D10, C3D15, C3D20, C3D20R; S3, S4, S6, S8, S8R and B31, B32, B32R (`*NORMAL`; sections RECT, CIRC, PIPE, BOX, with offsets); T3D2, SPRINGA, SPRING1, SPRING2 |
 //! | materials | `*ELASTIC` (ISO, ORTHO, ANISO, ENGINEERING CONSTANTS), `*EXPANSION`, `*CONDUCTIVITY` (ISO, ORTHO), `*DENSITY`, `*SPECIFIC HEAT`, all by temperature; `*ORIENTATION` |
 //! | constraints | `*BOUNDARY`, `*EQUATION` (also REMOVE), `*TRANSFORM`, `*TIE` |
-//! | loads | `*CLOAD`, `*DLOAD` (P, GRAV, CENTRIF), `*DSLOAD` (P), `*TEMPERATURE`, `*INITIAL CONDITIONS` (TEMPERATURE, STRESS), `*AMPLITUDE`; `*CFLUX`, `*DFLUX`, `*FILM`, `*RADIATE` |
+//! | loads | `*CLOAD`, `*DLOAD` (P, GRAV), `*DSLOAD` (P), `*TEMPERATURE`, `*INITIAL CONDITIONS` (TEMPERATURE, STRESS), `*AMPLITUDE`; `*CFLUX`, `*DFLUX`, `*FILM`, `*RADIATE` |
 //! | steps | `*STATIC`, `*FREQUENCY`, `*BUCKLE`, `*HEAT TRANSFER` (steady, in time; a `*STATIC` step after it takes its temperatures); `OP=MOD` and `OP=NEW` |
 //!
 //! Everything else is refused in one line that names all of it.

@@ -62,8 +62,6 @@ pub(super) struct Cell {
     pub(super) across: f64,
     /// Points of integration, where they are not those of its shape.
     pub(super) points: Vec<Point>,
-    /// Material and axes at every point, where they differ.
-    pub(super) layers: Vec<(u32, Option<u32>)>,
 }
 
 /// A linear spring: its force is k times a sum of displacements, and acts on each by its factor.
@@ -118,37 +116,6 @@ impl Orientation {
         match *self {
             Self::Straight(frame) => frame,
             Self::Around { origin, axis } => tensor::cylindrical(at.to_array(), origin, axis),
-        }
-    }
-}
-
-/// Force on a volume.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Pull {
-    /// m/s².
-    Weight(DVec3),
-    /// About an axis: a point of it, its direction, the square of the angular velocity.
-    Spin { origin: DVec3, axis: DVec3, squared: f64 },
-}
-
-impl Pull {
-    /// So many times as much.
-    pub(super) fn times(self, factor: f64) -> Self {
-        match self {
-            Self::Weight(acceleration) => Self::Weight(factor * acceleration),
-            Self::Spin { origin, axis, squared } => {
-                Self::Spin { origin, axis, squared: factor * squared }
-            }
-        }
-    }
-
-    /// m/s².
-    pub(super) fn at(self, place: DVec3) -> DVec3 {
-        match self {
-            Self::Weight(acceleration) => acceleration,
-            Self::Spin { origin, axis, squared } => {
-                squared * (place - origin).reject_from_normalized(axis)
-            }
         }
     }
 }
@@ -211,14 +178,13 @@ pub(super) struct Step {
     pub(super) forces: BTreeMap<(u32, u8), f64>,
     /// Pa, by element and face.
     pub(super) pressures: BTreeMap<(u32, u8), f64>,
-    pub(super) pulls: Vec<(u32, Pull)>,
+    /// Accelerations of elements by which they weigh, m/s².
+    pub(super) pulls: Vec<(u32, DVec3)>,
     /// Of every node; empty: as at the beginning, or as the last heat step has left it.
     pub(super) warm: Vec<f64>,
     /// Temperatures that a heat step holds.
     pub(super) temperatures: BTreeMap<u32, f64>,
     pub(super) heating: BTreeMap<Heated, [f64; 2]>,
-    /// Elements that are made of another material than their own.
-    pub(super) materials: BTreeMap<u32, u32>,
 }
 
 impl Deck {

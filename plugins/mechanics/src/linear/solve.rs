@@ -10,7 +10,7 @@ use super::{
     element::{Element, Folded, Warmth},
     free::Free,
     heat,
-    model::{Deck, Procedure, Pull, Step},
+    model::{Deck, Procedure, Step},
     modes,
 };
 use crate::{
@@ -58,9 +58,7 @@ pub enum LinearError {
         node: u32,
     },
     /// Weight of what has none.
-    #[error(
-        "{step}: weight or spin acts on element {element}, whose material {material} has no *DENSITY"
-    )]
+    #[error("{step}: weight acts on element {element}, whose material {material} has no *DENSITY")]
     Weightless {
         /// Name of the step.
         step: String,
@@ -244,7 +242,7 @@ impl<'a> System<'a> {
     }
 
     pub(super) fn element(&self, e: usize) -> Element<'a> {
-        Element::new(self.deck, self.step, e)
+        Element::new(self.deck, e)
     }
 
     /// Stiffness and forces of every element, and the stiffness of every spring.
@@ -396,21 +394,21 @@ impl<'a> System<'a> {
     }
 
     /// What acts on elements.
-    pub(super) fn distributed(&self) -> Result<Loads<'a>, LinearError> {
+    pub(super) fn distributed(&self) -> Result<Loads, LinearError> {
         let mut loads = Loads { by_cell: HashMap::new() };
         for (&(cell, face), &value) in &self.step.pressures {
             loads.by_cell.entry(cell).or_default().0.push((face, value));
         }
-        for (cell, pull) in &self.step.pulls {
-            let element = self.element(*cell as usize);
+        for &(cell, pull) in &self.step.pulls {
+            let element = self.element(cell as usize);
             if element.material().density.is_none() {
                 return Err(LinearError::Weightless {
                     step: self.step.name.clone(),
-                    element: self.deck.cells[*cell as usize].label,
+                    element: self.deck.cells[cell as usize].label,
                     material: element.material().name.clone(),
                 });
             }
-            loads.by_cell.entry(*cell).or_default().1.push(pull);
+            loads.by_cell.entry(cell).or_default().1.push(pull);
         }
         Ok(loads)
     }
@@ -488,12 +486,12 @@ fn unknowns(deck: &Deck, e: usize) -> Vec<u32> {
     }
 }
 
-/// Pressures (face, Pa) and pulls of elements.
-pub(super) struct Loads<'a> {
-    by_cell: HashMap<u32, (Vec<(u8, f64)>, Vec<&'a Pull>)>,
+/// Pressures (face, Pa) and accelerations of elements.
+pub(super) struct Loads {
+    by_cell: HashMap<u32, (Vec<(u8, f64)>, Vec<DVec3>)>,
 }
 
-impl Loads<'_> {
+impl Loads {
     pub(super) fn add(
         &self,
         e: usize,
@@ -505,8 +503,8 @@ impl Loads<'_> {
         pressures.iter().for_each(|&(face, p)| element.pressure(usize::from(face), p, force));
         let warm = warmth.now.iter().sum::<f64>() / warmth.now.len() as f64;
         let density = element.density(warm);
-        for pull in pulls {
-            element.volume_force(|at| density * pull.at(at.place), force)?;
+        for &pull in pulls {
+            element.volume_force(density * pull, force)?;
         }
         Ok(())
     }

@@ -7,8 +7,10 @@ mod procedure;
 
 use std::collections::BTreeMap;
 
+use glam::DVec3;
+
 use super::{
-    model::{Heated, Procedure, Pull, Step},
+    model::{Heated, Procedure, Step},
     read::{Reader, plain},
 };
 use crate::{
@@ -32,11 +34,10 @@ pub(super) struct State {
     kept: BTreeMap<(u32, u8), Given<f64>>,
     forces: BTreeMap<(u32, u8), Given<f64>>,
     pressures: BTreeMap<(u32, u8), Given<f64>>,
-    pulls: BTreeMap<(String, String), Given<(Vec<u32>, Pull)>>,
+    pulls: BTreeMap<String, Given<(Vec<u32>, DVec3)>>,
     warm: BTreeMap<u32, Given<f64>>,
     temperatures: BTreeMap<u32, Given<f64>>,
     pub(super) heating: BTreeMap<Heated, Given<[f64; 2]>>,
-    materials: BTreeMap<u32, u32>,
     pub(super) step: u32,
     open: Option<Open>,
     /// When the steps before it ended.
@@ -67,13 +68,12 @@ impl State {
             kept: self.kept.keys().copied().collect(),
             forces: times(&self.forces)?,
             pressures: times(&self.pressures)?,
-            materials: self.materials.clone(),
             ..Step::default()
         };
         for pull in self.pulls.values() {
             let factor = factor(&pull.amplitude)?;
             let (elements, pull) = &pull.value;
-            step.pulls.extend(elements.iter().map(|&e| (e, pull.times(factor))));
+            step.pulls.extend(elements.iter().map(|&e| (e, factor * *pull)));
         }
         Ok(step)
     }
@@ -97,7 +97,7 @@ impl Reader {
     pub(super) fn history(&mut self, card: &Card<'_>, state: &mut State) -> Result<(), Fault> {
         let name = plain(card);
         const WITHIN: &str = "STATIC FREQUENCY BUCKLE HEATTRANSFER ENDSTEP CLOAD DLOAD DSLOAD \
-            TEMPERATURE CFLUX DFLUX FILM RADIATE CHANGESOLIDSECTION";
+            TEMPERATURE CFLUX DFLUX FILM RADIATE";
         if WITHIN.split_ascii_whitespace().any(|w| w == name) && state.open.is_none() {
             return Err(card.fault(format!("*{} must stand in a *STEP", card.name)));
         }
@@ -111,7 +111,6 @@ impl Reader {
             "DLOAD" | "DSLOAD" => self.dload(card, state, name == "DSLOAD"),
             "TEMPERATURE" => self.temperature(card, state),
             "CFLUX" | "DFLUX" | "FILM" | "RADIATE" => self.heating(card, state),
-            "CHANGESOLIDSECTION" => self.change(card, state),
             "INITIALCONDITIONS" => self.initial(card),
             "PHYSICALCONSTANTS" => self.constants(card),
             _ => Ok(()),
@@ -128,7 +127,7 @@ impl Reader {
     /// What is in force at the end of the step.
     fn end(&mut self, procedure: Procedure, open: &Open, state: &State) -> Result<(), Fault> {
         let &Open { line, duration, .. } = open;
-        self.suits(procedure, state, line)?;
+        self.suits(procedure, line)?;
         let in_time = matches!(procedure, Procedure::Heat { steady: false, .. });
         let factor = |amplitude: &Option<String>| -> Result<f64, Fault> {
             let Some(name) = amplitude else { return Ok(1.0) };

@@ -406,6 +406,9 @@ fn what_is_not_computed_is_refused_by_its_name() {
         "DEFORMATION PLASTICITY",
         "COUPLED TEMPERATURE-DISPLACEMENT",
         "UNCOUPLED TEMPERATURE-DISPLACEMENT",
+        "CHANGE SOLID SECTION",
+        "NODAL THICKNESS",
+        "MEMBRANE",
     ] {
         let line = refusal(&format!("*NODE\n1,0,0\n*{card}\n"));
         assert!(line.contains(&format!("deck.inp:3: *{card} is not computed")), "{line}");
@@ -432,6 +435,12 @@ fn what_is_not_computed_is_refused_by_its_name() {
         ("*CLOAD,", "*CLOAD,LOAD CASE=2,", "*CLOAD: parameter \"LOAD CASE\""),
         ("*CLOAD,", "*CLOAD,TIME DELAY=1.,", "*CLOAD: parameter \"TIME DELAY\""),
         ("*STATIC\n", "*HEAT TRANSFER,FREQUENCY\n", "*HEAT TRANSFER: parameter \"FREQUENCY\""),
+        ("*CLOAD,", "*DLOAD\nALL,CENTRIF,5.,0.,0.,0.,0.,1.,0.\n*CLOAD,", "load \"CENTRIF\""),
+        (
+            "*STEP\n",
+            "*SHELL SECTION,ELSET=S,COMPOSITE\n1.,,M\n*STEP\n",
+            "*SHELL SECTION: parameter \"COMPOSITE\"",
+        ),
         ("TYPE=STRESS", "TYPE=PLASTIC STRAIN", "TYPE=\"PLASTIC STRAIN\""),
     ] {
         let line = refusal(&good.replacen(old, new, 1));

@@ -42,9 +42,8 @@ pub(super) enum Profile {
     /// Of solids and planes.
     #[default]
     Whole,
-    /// How far the middle lies off the nodes along the normal, over the thickness; thickness,
-    /// material and axes of every layer from below, where it has some.
-    Shell { offset: f64, layers: Vec<(f64, u32, Option<u32>)> },
+    /// How far the middle lies off the nodes along the normal, over the thickness.
+    Shell { offset: f64 },
     /// Its 1-direction; its sizes along both, and how far the nodes lie off its middle over these.
     Beam { first: DVec3, size: [f64; 2], offset: [f64; 2], form: Form },
 }
@@ -153,7 +152,7 @@ impl Thin {
     /// Axes at each of its nodes.
     fn axes(self, places: &[DVec3], section: &Section) -> Option<Vec<Axes>> {
         match (self, &section.profile) {
-            (Self::Shell { .. }, Profile::Shell { offset, .. }) => {
+            (Self::Shell { .. }, Profile::Shell { offset }) => {
                 let normal = |at: &[f64; 2]| {
                     let jets = face_functions(places.len(), *at);
                     let along = |i: usize| -> DVec3 {
@@ -417,7 +416,6 @@ impl Reader {
         let raw = &self.raw[element as usize];
         let ring = |place| self.rings.of.get(&(element, place)).map(|&n| &self.rings.all[n]);
         let rings: Vec<&Ring> = (0..raw.nodes.len()).filter_map(ring).collect();
-        let (points, materials) = integration(thin, section);
         Cell {
             label: raw.label,
             shape: thin.shape(),
@@ -425,8 +423,7 @@ impl Reader {
             material: section.material,
             orientation: section.orientation,
             across: 0.0,
-            points,
-            layers: materials,
+            points: integration(section),
         }
     }
 }
@@ -518,41 +515,18 @@ fn dyad(a: DVec3, b: DVec3) -> DMat3 {
     DMat3::from_cols(b.x * a, b.y * a, b.z * a)
 }
 
-/// Points of integration and the material and axes at each, where they are not those of the shape.
-type Integration = (Vec<Point>, Vec<(u32, Option<u32>)>);
-
-fn integration(thin: Thin, section: &Section) -> Integration {
-    match &section.profile {
-        Profile::Shell { layers, .. } if !layers.is_empty() => layered(thin.shape(), layers),
-        &Profile::Beam { size, form: form @ (Form::Pipe(_) | Form::Box(_)), .. } => {
-            let around = match form {
-                Form::Box(thick) => walls(size, thick),
-                Form::Pipe(wall) => pipe(size[0], wall),
-                Form::Full | Form::Round => Vec::new(),
-            };
-            let row = |&(x, w): &(f64, f64)| {
-                around.iter().map(move |&([y, z], v)| ([x, y, z], w * v)).collect::<Vec<_>>()
-            };
-            (GAUSS_2.iter().flat_map(row).collect(), Vec::new())
-        }
-        _ => (Vec::new(), Vec::new()),
-    }
-}
-
-/// The points of the shape, once in every layer.
-fn layered(shape: Shape, layers: &[(f64, u32, Option<u32>)]) -> Integration {
-    let whole: f64 = layers.iter().map(|l| l.0).sum();
-    let (mut points, mut materials, mut below) = (Vec::new(), Vec::new(), 0.0);
-    for &(thickness, material, axes) in layers {
-        let share = thickness / whole;
-        for ([x, y, z], weight) in shape.points() {
-            let height = 2.0 * (below + 0.5 * (z + 1.0) * thickness) / whole - 1.0;
-            points.push(([x, y, height], weight * share));
-            materials.push((material, axes));
-        }
-        below += thickness;
-    }
-    (points, materials)
+/// Points of integration, where they are not those of the shape.
+fn integration(section: &Section) -> Vec<Point> {
+    let Profile::Beam { size, form, .. } = section.profile else { return Vec::new() };
+    let around = match form {
+        Form::Box(thick) => walls(size, thick),
+        Form::Pipe(wall) => pipe(size[0], wall),
+        Form::Full | Form::Round => return Vec::new(),
+    };
+    let row = |&(x, w): &(f64, f64)| {
+        around.iter().map(move |&([y, z], v)| ([x, y, z], w * v)).collect::<Vec<_>>()
+    };
+    GAUSS_2.iter().flat_map(row).collect()
 }
 
 /// Eight points on the circle that has the tube's moment of inertia, in natural coordinates of the

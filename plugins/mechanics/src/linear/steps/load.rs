@@ -7,7 +7,6 @@ use crate::{
     linear::{
         law::ORDER,
         mesh::name_of,
-        model::Pull,
         read::{Kind, Reader, Surface},
         thin::Thin,
         warm::is_temperature,
@@ -95,20 +94,6 @@ impl Reader {
         Ok(((turning.ok_or_else(none)?, angle), 1.0))
     }
 
-    /// `*CHANGE SOLID SECTION`
-    pub(super) fn change(&mut self, card: &Card<'_>, state: &mut State) -> Result<(), Fault> {
-        card.only(&["ELSET", "MATERIAL"])?;
-        let material = card.need("MATERIAL")?;
-        let undefined = || card.fault(format!("material {} is not defined", quote(&material)));
-        let &material = self.materials.get(&material).ok_or_else(undefined)?;
-        for element in self.named_elements(card)? {
-            if let Some(cell) = self.raw[element as usize].cell {
-                state.materials.insert(cell, material);
-            }
-        }
-        Ok(())
-    }
-
     /// Forces. What is given twice in a step adds up, as in CalculiX.
     pub(super) fn cload(&mut self, card: &Card<'_>, state: &mut State) -> Result<(), Fault> {
         card.only(&["OP", "AMPLITUDE"])?;
@@ -154,11 +139,11 @@ impl Reader {
             };
             let (kind, value) = (kind.to_ascii_uppercase(), row.number(value)?);
             let step = state.step;
-            if matches!(kind.as_str(), "GRAV" | "CENTRIF") && !on_surface {
+            if kind == "GRAV" && !on_surface {
                 let elements = self.some_cells(target, row)?;
-                let pull = self.pull(&kind, value, rest, row)?;
+                let pull = self.acceleration(value, rest, row)?;
                 let given = Given { value: (elements, pull), amplitude: amplitude.clone(), step };
-                state.pulls.insert((target.to_ascii_uppercase(), kind), given);
+                state.pulls.insert(target.to_ascii_uppercase(), given);
                 continue;
             }
             for face in self.loaded(target, &kind, on_surface, row)? {
@@ -178,7 +163,7 @@ impl Reader {
         on_surface: bool,
         row: Row<'_>,
     ) -> Result<Vec<(u32, u8)>, Fault> {
-        let kinds = "P1 to P6, GRAV and CENTRIF, and P on a *DSLOAD";
+        let kinds = "P1 to P6 and GRAV, and P on a *DSLOAD";
         let is_face = kind.len() == 2 && kind.starts_with('P');
         match (on_surface, self.surfaces.get(&target.to_ascii_uppercase())) {
             (true, Some(Surface::Faces(faces))) if kind == "P" => Ok(self.cell_faces(faces)),
@@ -211,20 +196,12 @@ impl Reader {
         faces.iter().filter_map(|&(e, face)| Some((self.raw[e as usize].cell?, face))).collect()
     }
 
-    /// Weight: g and its direction. Spin: ω², a point of the axis and its direction.
-    fn pull(&self, kind: &str, value: f64, rest: &[&str], row: Row<'_>) -> Result<Pull, Fault> {
+    /// g and its direction.
+    fn acceleration(&self, g: f64, rest: &[&str], row: Row<'_>) -> Result<DVec3, Fault> {
         let numbers = rest.iter().map(|w| row.number(w)).collect::<Result<Vec<_>, _>>()?;
-        let length = self.units.length();
-        match (kind, numbers.as_slice()) {
-            ("GRAV", &[x, y, z]) => Ok(Pull::Weight(value * length * DVec3::new(x, y, z))),
-            ("CENTRIF", &[x, y, z, a, b, c]) => {
-                let axis = DVec3::new(a, b, c).try_normalize();
-                let axis = axis.ok_or_else(|| row.fault("the axis has no length"))?;
-                Ok(Pull::Spin { origin: length * DVec3::new(x, y, z), axis, squared: value })
-            }
-            _ => Err(row.fault(
-                "needed are: set, GRAV, g, and its direction; or set, CENTRIF, ω², a point of the axis and its direction",
-            )),
+        match numbers.as_slice() {
+            &[x, y, z] => Ok(g * self.units.length() * DVec3::new(x, y, z)),
+            _ => Err(row.fault("needed are: set, GRAV, g, and its direction")),
         }
     }
 

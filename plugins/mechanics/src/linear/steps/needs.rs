@@ -1,9 +1,8 @@
 //! What a step needs before it can be computed: of materials, of elements, of the steps before it.
 
-use super::State;
 use crate::{
     linear::{
-        model::{Material, Procedure, Pull},
+        model::{Material, Procedure},
         read::{Kind, Reader},
     },
     read::Fault,
@@ -11,20 +10,11 @@ use crate::{
 
 impl Reader {
     /// Materials have what the step needs, and the step follows one that it rests on.
-    pub(super) fn suits(
-        &self,
-        procedure: Procedure,
-        state: &State,
-        line: u32,
-    ) -> Result<(), Fault> {
-        let used =
-            self.deck.cells.iter().map(|c| c.material).chain(state.materials.values().copied());
-        let lacks = |has: fn(&Material) -> bool, what: &str| {
-            let mut used = used.clone().map(|m| &self.deck.materials[m as usize]);
-            match used.find(|m| !has(m)) {
-                Some(m) => Err(Fault::at(line, format!("material {} has no {what}", m.name))),
-                None => Ok(()),
-            }
+    pub(super) fn suits(&self, procedure: Procedure, line: u32) -> Result<(), Fault> {
+        let used = self.deck.cells.iter().map(|c| &self.deck.materials[c.material as usize]);
+        let lacks = |has: fn(&Material) -> bool, what: &str| match used.clone().find(|m| !has(m)) {
+            Some(m) => Err(Fault::at(line, format!("material {} has no {what}", m.name))),
+            None => Ok(()),
         };
         let heats = matches!(procedure, Procedure::Heat { .. });
         if !heats {
@@ -40,9 +30,6 @@ impl Reader {
                     line,
                     "PERTURBATION: needed is a *STATIC step before this one",
                 ));
-            }
-            if before.is_some_and(|s| s.pulls.iter().any(|p| matches!(p.1, Pull::Spin { .. }))) {
-                return Err(Fault::at(line, "vibrations of what spins are not computed"));
             }
         }
         if !heats {
