@@ -74,163 +74,16 @@ fn bodies_that_nothing_holds_vibrate() {
     assert!(found[5].abs() < 1e-6 * found[6], "{found:?}");
 }
 
-/// The same bar, pulled at its end by 1 Pa from rest: when a wave has come back, both of its modes
-/// are at their farthest, (16/π²)(1 + 1/9) L/M; as long after that they are back. Pulled at a
-/// frequency with damping: Σ 2/(ρL)/(ω² − Ω² + iαΩ).
-#[test]
-fn a_bar_that_is_pulled_swings_as_its_modes_do() {
-    let modulus = E * 0.7 / (1.3 * 0.4);
-    let back = 2.0 * (3.0 / modulus).sqrt();
-    let bar =
-        bar(1.0, 8, 0.3, "C3D20") + "*BOUNDARY\nLOW,1\nALL,2,3\n*STEP\n*FREQUENCY\n2\n*END STEP\n";
-    let moved = format!(
-        "{bar}*STEP\n*MODAL DYNAMIC,DIRECT=NO\n.1,{back:?}\n*DLOAD\n8,P2,-1.\n*END STEP\n*STEP\n*MODAL DYNAMIC\n.01,{back:?}\n*END STEP\n"
-    );
-    let solved = solve(&moved);
-    let end = |of: &Solved| of.displacements.last().unwrap().x;
-    near(end(&solved[1]) * modulus / (16.0 / PI.powi(2) * (1.0 + 1.0 / 9.0)), 1.0, 1e-3);
-    near(end(&solved[2]) * modulus, 0.0, 1e-2);
-    let pace = 4.0 * PI;
-    let shaken = format!(
-        "{bar}*STEP\n*STEADY STATE DYNAMICS\n2.,2.\n*MODAL DAMPING,RAYLEIGH\n,,.7,0.\n*DLOAD\n8,P2,-1.\n*END STEP\n"
-    );
-    let solved = solve(&shaken);
-    let mut expected = [0.0; 2];
-    for n in [1.0, 3.0] {
-        let resists = [(n * 0.5 * PI).powi(2) * modulus / 3.0 - pace * pace, 0.7 * pace];
-        let share = 2.0 / 3.0 / (resists[0].powi(2) + resists[1].powi(2));
-        expected = [expected[0] + share * resists[0], expected[1] - share * resists[1]];
-    }
-    assert_eq!(solved.len(), 3);
-    (0..2).for_each(|i| near(end(&solved[1 + i]) / expected[i], 1.0, 2e-3));
-}
-
-/// The block on a spring of .3 N/m with a dashpot of .6 N·s/m beside it, pulled by 3 N from rest and
-/// shaken by them at 1 rad/s: ẍ + .2 ẋ + .1 x = 1.
-#[test]
-fn dashpots_slow_down_what_swings() {
-    let block = bar(1.0, 1, 1.0, "C3D20")
-        + "*NODE\n900,-1.,0.,0.\n*ELEMENT,TYPE=SPRINGA,ELSET=S\n900,900,1\n*SPRING,ELSET=S\n.3\n\
-           *ELEMENT,TYPE=DASHPOTA,ELSET=D\n901,900,1\n*DASHPOT,ELSET=D\n.6\n*BOUNDARY\nALL,2,3\n900,1,3\n";
-    let load = "*DLOAD\nALL,GRAV,1.,1.,0.,0.\n*END STEP\n";
-    let modes = "*STEP\n*FREQUENCY\n1\n*END STEP\n*STEP\n";
-    // s = .1, λ = .1, r = .3.
-    let swung = 10.0 * (1.0 - (-0.2f64).exp() * (0.6f64.cos() + 0.6f64.sin() / 3.0));
-    let moved = solve(&format!("{block}{modes}*MODAL DYNAMIC\n.5,2.\n{load}"));
-    near(moved[1].displacements[12].x / swung, 1.0, 2e-2);
-    let moved = solve(&format!("{block}*STEP\n*DYNAMIC,DIRECT,ALPHA=0.\n.01,2.\n{load}"));
-    near(moved[0].displacements[12].x / swung, 1.0, 2e-2);
-    let pace = 0.5 / PI;
-    let shaken = solve(&format!("{block}{modes}*STEADY STATE DYNAMICS\n{pace:?},{pace:?}\n{load}"));
-    // 1/(.1 − 1 + .2 i).
-    near(shaken[1].displacements[12].x, -0.9 / 0.85, 2e-2);
-    near(shaken[2].displacements[12].x, -0.2 / 0.85, 2e-2);
-}
-
-/// A block that nothing holds, of which two modes are known, falls by g t²/2.
-#[test]
-fn what_nothing_holds_falls() {
-    let deck = bar(1.0, 1, 1.0, "C3D20")
-        + "*BOUNDARY\nALL,2,3\n*STEP\n*FREQUENCY\n2\n*END STEP\n\
-           *STEP\n*MODAL DYNAMIC\n.5,2.\n*DLOAD\nALL,GRAV,3.,1.,0.,0.\n*END STEP\n";
-    near(solve(&deck)[1].displacements[12].x, 6.0, 1e-5);
-}
-
-/// A spring that is soft from 1 m on, pulled along itself by 11 N.
-#[test]
-fn springs_follow_their_table_and_turn() {
-    let deck = "*NODE\n1,0,0,0\n2,1,0,0\n*ELEMENT,TYPE=SPRINGA,ELSET=S\n1,1,2\n\
-                *SPRING,ELSET=S,NONLINEAR\n0.,0.\n10.,1.\n100.,20.\n*BOUNDARY\n1,1,3\n2,2,3\n\
-                *STEP,NLGEOM\n*STATIC\n*CLOAD\n2,1,11.\n*END STEP\n";
-    near(solve(deck)[0].displacements[1].x, 1.0 + 19.0 / 90.0, 1e-9);
-}
-
-/// A bolt between two springs of 10 N/m, pulled together by 5 N.
-#[test]
-fn bolts_pull_their_ends_together() {
-    let deck = "*NODE\n1,0,0,0\n2,1,0,0\n3,-1,0,0\n4,2,0,0\n9,0,0,0\n*ELEMENT,TYPE=SPRINGA,ELSET=S\n\
-                1,3,1\n2,2,4\n*SPRING,ELSET=S\n10.\n*ELEMENT,TYPE=B31\n3,1,2\n\
-                *PRE-TENSION SECTION,ELEMENT=3,NODE=9\n1.,0.,0.\n\
-                *BOUNDARY\n3,1,3\n4,1,3\n1,2,3\n2,2,3\n*STEP\n*STATIC\n*CLOAD\n9,1,5.\n*END STEP\n";
-    let moved = &solve(deck)[0].displacements;
-    near(moved[0].x, 0.5, 1e-12);
-    near(moved[1].x, -0.5, 1e-12);
-    near(moved[4].x, 1.0, 1e-12);
-}
-
-/// A node on a spring of 10 N/m that is pressed by 2 N against a stop .1 m away, and pulled off it.
-#[test]
-fn gaps_bear_once_they_have_closed() {
-    let moved = |force: f64| {
-        let deck = format!(
-            "*NODE\n1,0,0,0\n2,1,0,0\n3,2,0,0\n*ELEMENT,TYPE=SPRINGA,ELSET=S\n1,2,3\n*SPRING,ELSET=S\n10.\n\
-             *ELEMENT,TYPE=GAPUNI,ELSET=G\n2,1,2\n*GAP,ELSET=G\n.1,2.,0.,0.,,1e3,1e-3\n*BOUNDARY\n1,1,3\n2,2,3\n\
-             3,1,3\n*STEP,NLGEOM\n*STATIC\n*CLOAD\n2,1,{force:?}\n*END STEP\n"
-        );
-        solve(&deck)[0].displacements[1].x
-    };
-    let far = -moved(-2.0);
-    let closed = far - 0.1;
-    let share = 0.5 + (closed * 1e6 / PI).atan() / PI;
-    near(10.0 * far + 1e3 * closed * share, 2.0, 1e-9);
-    near(closed, 1e-3, 2e-5);
-    near(10.0 * moved(2.0) + 1e-3, 2.0, 1e-5);
-}
-
-/// A block on a soft spring whose support follows a ramp moves with the ramp, and its modes by what
-/// the ramp's corner left: u = v (t − sin(ωt)/ω).
-#[test]
-fn what_stands_on_a_support_that_moves_is_carried_with_it() {
-    let block = bar(1.0, 1, 1.0, "C3D20")
-        + "*NODE\n900,-1.,0.,0.\n*ELEMENT,TYPE=SPRINGA,ELSET=S\n900,900,1\n*SPRING,ELSET=S\n.3\n\
-           *AMPLITUDE,NAME=A\n0.,0.,9.,9.\n*BOUNDARY\nALL,2,3\n900,1,3\n*STEP\n*FREQUENCY\n1\n*END STEP\n\
-           *STEP\n*MODAL DYNAMIC\n.01,2.\n*BOUNDARY,AMPLITUDE=A\n900,1,1,.5\n*END STEP\n";
-    // All of the block's mass, 3 kg, on .3 N/m, which is far softer than the block.
-    let pace = (0.3f64 / 3.0).sqrt();
-    let solved = solve(&block);
-    let far = solved[1].displacements[12].x;
-    near(far, 0.5 * (2.0 - (2.0 * pace).sin() / pace), 1e-3);
-}
-
-/// The same bar by the equations themselves, with all its modes: at rest again at 2 L/M. And damped by
-/// its mass alone, thrown as one body, it slows down by e^(−αt).
-#[test]
-fn a_bar_swings_in_time() {
-    let modulus = E * 0.7 / (1.3 * 0.4);
-    let back = 2.0 * (3.0 / modulus).sqrt();
-    let load = "*DLOAD\n8,P2,-1.\n*END STEP\n";
-    let moved = |kind: &str, way: &str| {
-        let held = bar(1.0, 8, 0.3, kind) + "*BOUNDARY\nLOW,1\nALL,2,3\n";
-        let deck = format!("{held}*STEP\n*DYNAMIC,{way}\n{:?},{back:?}\n{load}", back / 80.0);
-        *solve(&deck)[0].displacements.last().unwrap()
-    };
-    // A kink that increments, given or chosen, round.
-    near(moved("C3D20", "DIRECT,ALPHA=0.").x * modulus, 2.0, 0.05);
-    near(moved("C3D20R", "DIRECT,ALPHA=0.").x * modulus, 2.0, 0.05);
-    near(moved("C3D20", "ALPHA=0.").x * modulus, 2.0, 0.05);
-    let thrown = bar(1.0, 1, 1.0, "C3D20")
-        .replace("*DENSITY", "*DAMPING,ALPHA=2.,BETA=0.\n*DENSITY")
-        + "*BOUNDARY\nALL,2,3\n*STEP\n*DYNAMIC,DIRECT,ALPHA=0.\n.001,1.\n*DLOAD\nALL,GRAV,1.,1.,0.,0.\n*END STEP\n";
-    // ẍ + 2 ẋ = 1 from rest.
-    near(solve(&thrown)[0].displacements[0].x, 0.5 - 0.25 * (1.0 - (-2.0f64).exp()), 1e-5);
-}
-
 /// Warmed through at one end, free to grow: all of it grows alike, without stress.
 #[test]
 fn blocks_grow_as_warm_as_they_settle() {
     let deck = cube(
-        "*STEP\n*COUPLED TEMPERATURE-DISPLACEMENT,STEADY STATE\n*BOUNDARY\nLOW,11,11,100.\n*END STEP\n",
+        "*STEP\n*HEAT TRANSFER,STEADY STATE\n*BOUNDARY\nLOW,11,11,100.\n*END STEP\n*STEP\n*STATIC\n*END STEP\n",
     );
     let solved = solve(&deck);
     near(*solved[0].temperatures.last().unwrap(), 100.0, 1e-9);
     near(solved[1].displacements.last().unwrap().x, 0.1, 1e-9);
     solved[1].stresses.iter().flatten().flatten().for_each(|s| near(*s, 0.0, 1e-7));
-    let why = parse(
-        deck.replace("*STEP", "*STEP,NLGEOM").as_bytes(),
-        Path::new("deck.inp"),
-        Units::MetreNewton,
-    );
-    assert!(why.unwrap_err().to_string().contains("without NLGEOM"));
 }
 
 /// A pair of blocks that an equation binds goes on alone once the equation is removed.
@@ -250,153 +103,6 @@ fn cube(steps: &str) -> String {
     bar(1.0, 1, 1.0, "C3D20").replace("*DENSITY", "*EXPANSION\n1e-3\n*DENSITY")
         + "*BOUNDARY\nLOW,1\n1,2,3\n2,3\n4,2\n11,2,3\n12,3\n5,3\n8,2\n14,2\n21,2,3\n22,3\n24,2\n25,3\n28,2\n"
         + steps
-}
-
-/// Stretched by a fifth: E₁ = .22, E₂ = −ν E₁, σ = E E₁ λ₁/λ₂²; under a pressure on what has become
-/// smaller; warmed by what strains it by a tenth, without stress.
-#[test]
-fn cubes_stretch_far_as_green_and_kirchhoff_say() {
-    let pulled = cube("*STEP,NLGEOM\n*STATIC\n*BOUNDARY\nHIGH,1,1,.2\n*END STEP\n");
-    let solved = solve(&pulled);
-    let across = (1.0f64 - 2.0 * 0.3 * 0.22).sqrt();
-    for stress in solved[0].stresses.iter().flatten() {
-        near(stress[0], E * 0.22 * 1.2 / (across * across), 1e-7);
-        stress[1..].iter().for_each(|s| near(*s, 0.0, 1e-7));
-    }
-    near(solved[0].displacements[2].y, across - 1.0, 1e-9);
-    let pressed = cube("*STEP,NLGEOM\n*STATIC\n*DLOAD\n1,P2,-40.\n*END STEP\n");
-    let long = 1.0 + solve(&pressed)[0].displacements.last().unwrap().x;
-    let green = 0.5 * (long * long - 1.0);
-    near(40.0 * (1.0 - 0.6 * green), E * green * long, 1e-6);
-    let warm = cube("*STEP,NLGEOM\n*STATIC\n*TEMPERATURE\nALL,100.\n*END STEP\n");
-    let solved = solve(&warm);
-    near(solved[0].displacements[2].y, 0.1, 1e-9);
-    solved[0].stresses.iter().flatten().flatten().for_each(|s| near(*s, 0.0, 1e-7));
-}
-
-/// A cube of rubber that is held across, one of foam, and one of Ramberg's and Osgood's curve.
-#[test]
-fn cubes_of_rubber_and_foam_are_pulled_as_their_laws_say() {
-    let pulled = |law: &str, held: &str| {
-        let steps = "*STEP,NLGEOM\n*STATIC\n*BOUNDARY\nHIGH,1,1,.2\n*END STEP\n";
-        let deck = cube(&format!("{held}{steps}")).replace("*ELASTIC\n200.,.3\n", law);
-        solve(&deck)[0].stresses[0][0][0]
-    };
-    let long = 1.2f64;
-    let rubber = pulled("*HYPERELASTIC,NEO HOOKE\n10.,.1\n", "*BOUNDARY\nALL,2,3\n");
-    let shape = long.powf(4.0 / 3.0) - long.powf(-2.0 / 3.0);
-    near(rubber, 40.0 / 3.0 * shape / long + 20.0 * (long - 1.0), 1e-6);
-    let foam = pulled("*HYPERFOAM\n3.,5.,0.\n", "");
-    near(foam, 6.0 / 5.0 * (long.powi(5) - 1.0) / long, 1e-6);
-    let curve = pulled("*DEFORMATION PLASTICITY\n200.,.3,2.,5.,.4\n", "");
-    let almansi = 0.5 * (1.0 - 1.0 / (long * long));
-    near(curve + 0.4 * (curve / 2.0).powi(4) * curve, 200.0 * almansi, 1e-3);
-}
-
-/// A cantilever under P L²/EI = 2: down by .49346 L and back by .16064 L (Mattiasson 1981); and back
-/// to where it was once the force is gone.
-#[test]
-fn a_cantilever_bends_as_the_elastica() {
-    let (length, width) = (20.0, 0.4);
-    let force = 2.0 * E * f64::powi(width, 4) / 12.0 / (length * length);
-    let [corner, middle] = [-force / 12.0, force / 3.0];
-    let loads: String = (641..=648)
-        .map(|n| format!("{n},3,{:?}\n", if n <= 644 { corner } else { middle }))
-        .collect();
-    let deck = bar(length, 32, width, "C3D20")
-        + &format!(
-            "*BOUNDARY\nLOW,1,3\n*STEP,NLGEOM\n*STATIC\n*CLOAD\n{loads}*END STEP\n*STEP\n*STATIC\n*CLOAD,OP=NEW\n*END STEP\n"
-        );
-    let solved = solve(&deck);
-    let end = |of: &Solved| {
-        of.displacements[of.displacements.len() - 8..].iter().sum::<DVec3>() / 8.0 / length
-    };
-    near(end(&solved[0]).z, 0.49346, 2e-3);
-    near(end(&solved[0]).x, -0.16064, 2e-3);
-    near(end(&solved[1]).length(), 0.0, 1e-6);
-}
-
-/// What hardly strains is settled within rounding.
-#[test]
-fn small_loads_move_what_may_move_far() {
-    let deck = cube("*STEP,NLGEOM\n*STATIC\n*DLOAD\n1,P2,-2e-7\n*END STEP\n");
-    near(solve(&deck)[0].displacements.last().unwrap().x / 1e-9, 1.0, 1e-6);
-}
-
-/// A bar pulled beyond yield by forces, 1 % and a bit: bilinear as its table, then let go, which
-/// leaves what has flowed.
-#[test]
-fn bars_of_metal_keep_what_has_flowed() {
-    let stress = 2.2;
-    let deck = cube(&format!(
-        "*STEP,NLGEOM\n*STATIC\n*DLOAD\n1,P2,-{stress:?}\n*END STEP\n*STEP\n*STATIC\n*DLOAD,OP=NEW\n1,P2,0.\n*END STEP\n"
-    ))
-    .replace("*DENSITY", "*PLASTIC\n2.,0.\n4.,.1\n*DENSITY");
-    let solved = solve(&deck);
-    let flowed = (stress - 2.0) / 20.0;
-    near(solved[0].displacements.last().unwrap().x / (stress / E + flowed), 1.0, 2e-2);
-    near(solved[1].displacements.last().unwrap().x / flowed, 1.0, 2e-2);
-    solved[0].stresses.iter().flatten().for_each(|s| near(s[0], stress, 1e-6));
-    solved[1].stresses.iter().flatten().flatten().for_each(|s| near(*s, 0.0, 1e-6));
-    let why =
-        parse(deck.replace(",NLGEOM", "").as_bytes(), Path::new("deck.inp"), Units::MetreNewton);
-    assert!(why.unwrap_err().to_string().contains("material M: *PLASTIC is computed of what"));
-}
-
-/// A body that turns by a quarter of a circle has no stress.
-#[test]
-fn bodies_turn_far_without_stress() {
-    let deck = bar(1.0, 1, 1.0, "C3D20")
-        + "*NODE\n900,0.,0.,0.\n901,0.,0.,0.\n*RIGIDBODY,NSET=ALL,REFNODE=900,ROTNODE=901\n\
-           *BOUNDARY\n900,1,3\n901,1,3\n*STEP,NLGEOM\n*STATIC\n*BOUNDARY\n901,3,3,1.5707963267948966\n*END STEP\n";
-    let solved = solve(&deck);
-    // Of the corner at 1, 1, 1.
-    near(solved[0].displacements[14].distance(DVec3::new(-2.0, 0.0, 0.0)), 0.0, 1e-9);
-    solved[0].stresses.iter().flatten().flatten().for_each(|s| near(*s, 0.0, 1e-7));
-}
-
-/// Two B32 rolled up by a moment at their end, to where CalculiX 2.20 has it.
-#[test]
-fn beams_roll_up_under_a_moment() {
-    let deck = "*NODE\n10,0,0,0\n20,.2,0,0\n30,.4,0,0\n4,.6,0,0\n5,.8,0,0\n\
-                *ELEMENT,TYPE=B32,ELSET=ALL\n3,10,20,30\n5,30,4,5\n*MATERIAL,NAME=M\n*ELASTIC\n210000.,0.\n\
-                *BEAM SECTION,MATERIAL=M,ELSET=ALL,SECTION=RECT\n.03,.015\n0.,0.,1.\n\
-                *BOUNDARY\n10,1,6\n*STEP,NLGEOM\n*STATIC\n*CLOAD\n5,6,MOMENT\n*END STEP\n";
-    let moment = 0.5 * 210_000.0 * 0.03 * 0.015f64.powi(3) / 12.0 / 0.8;
-    let end = solve(&deck.replace("MOMENT", &format!("{moment:?}")))[0].displacements[4];
-    near(end.y, 0.125_093_1, 1e-6);
-    near(end.x, -0.013_195_2, 1e-6);
-}
-
-/// The same cantilever of C3D8I, whose bubbles bend far with it.
-#[test]
-fn elements_with_bubbles_bend_as_the_elastica() {
-    let (length, width, parts) = (20.0, 0.4, 40usize);
-    let mut deck = String::from("*NODE\n");
-    for station in 0..=parts {
-        let x = length * station as f64 / parts as f64;
-        for (k, [y, z]) in
-            [[0.0, 0.0], [width, 0.0], [width, width], [0.0, width]].iter().enumerate()
-        {
-            writeln!(deck, "{},{x:?},{y:?},{z:?}", 4 * station + k + 1).unwrap();
-        }
-    }
-    deck += "*ELEMENT,TYPE=C3D8I,ELSET=ALL\n";
-    for e in 0..parts {
-        let nodes: Vec<String> = (1..=8).map(|k| (4 * e + k).to_string()).collect();
-        writeln!(deck, "{},{}", e + 1, nodes.join(",")).unwrap();
-    }
-    let force = 2.0 * E * f64::powi(width, 4) / 12.0 / (length * length);
-    let loads: String =
-        (1..=4).map(|k| format!("{},3,{:?}\n", 4 * parts + k, -force / 4.0)).collect();
-    deck += &format!(
-        "*MATERIAL,NAME=M\n*ELASTIC\n200.,.3\n*SOLID SECTION,ELSET=ALL,MATERIAL=M\n\
-         *BOUNDARY\n1,1,3\n2,1,3\n3,1,3\n4,1,3\n*STEP,NLGEOM\n*STATIC\n*CLOAD\n{loads}*END STEP\n"
-    );
-    let solved = solve(&deck);
-    let end = solved[0].displacements[4 * parts..].iter().sum::<DVec3>() / 4.0 / length;
-    near(end.z, -0.49346, 3e-3);
-    near(end.x, -0.16064, 3e-3);
 }
 
 /// Euler's column with a free end: P = π² E I/(4 L²); both planes alike, so that each factor comes
@@ -474,30 +180,6 @@ fn forces_on_an_edge_of_a_shell_pull_it_evenly() {
     }
 }
 
-/// A plate that pulls at a ring, of 1 N, is one plate at all of the ring: it widens as under the same
-/// force around it.
-#[test]
-fn a_plate_at_a_ring_is_one_plate() {
-    let deck = |load: &str| {
-        String::from(
-            "*NODE\n1,2,0\n2,2,1\n3,1,1\n4,1,0\n5,2,.5\n6,1.5,1\n7,1,.5\n8,1.5,0\n9,3,0\n10,3,1\n11,3,.5\n\
-             12,2.5,1\n13,2.5,0\n*ELEMENT,TYPE=CAX8,ELSET=RING\n1,1,2,3,4,5,6,7,8\n\
-             *ELEMENT,TYPE=CPS8,ELSET=PLATE\n2,9,10,2,1,11,12,5,13\n*MATERIAL,NAME=M\n*ELASTIC\n200.,0.\n\
-             *SOLID SECTION,ELSET=RING,MATERIAL=M\n*SOLID SECTION,ELSET=PLATE,MATERIAL=M\n.01\n\
-             *BOUNDARY\n7,2\n*STEP\n*STATIC\n",
-        ) + load
-            + "*END STEP\n"
-    };
-    let around = 1.0 / (2.0 * PI * 2.0);
-    let plate = solve(&deck("*DLOAD\n2,P1,-100.\n"))[0].displacements[0].x;
-    let even = solve(&deck(&format!("*DLOAD\n1,P1,-{around:?}\n")))[0].displacements[0].x;
-    let sixth = 1.0 / 6.0;
-    let forces = format!("*CLOAD\n9,1,{sixth:?}\n10,1,{sixth:?}\n11,1,{:?}\n", 4.0 * sixth);
-    let pulled = solve(&deck(&forces))[0].displacements[0].x;
-    near(plate / even, 1.0, 1e-3);
-    near(pulled / plate, 1.0, 1e-9);
-}
-
 /// CalculiX 2.20 on its decks `rot1` (a moment at the end of two B32), `b31` (ten B31, a force) and
 /// the tube of `simplebeampipe1` with two elements.
 #[test]
@@ -519,30 +201,27 @@ fn beams_bend_as_those_of_calculix() {
 }
 
 /// Two beams that meet at a right angle, each of its own section, to where CalculiX 2.20 has them.
-fn corner(second: &str, kind: &str, step: &str, load: &str) -> Vec<DVec3> {
+fn corner(second: &str, kind: &str, load: &str) -> Vec<DVec3> {
     let deck = format!(
         "*NODE\n1,0,0,0\n2,.5,0,0\n3,1,0,0\n4,1,.5,0\n5,1,1,0\n*ELEMENT,TYPE={kind},ELSET=A\n1,1,2,3\n\
          *ELEMENT,TYPE={kind},ELSET=B\n2,3,4,5\n*MATERIAL,NAME=M\n*ELASTIC\n200.,.3\n\
          *BEAM SECTION,ELSET=A,MATERIAL=M,SECTION=RECT\n.1,.15\n0.,0.,1.\n\
          *BEAM SECTION,ELSET=B,MATERIAL=M,{second}\n0.,0.,1.\n\
-         *BOUNDARY\n1,1,6\n*STEP{step}\n*STATIC\n*CLOAD\n{load}\n*END STEP\n"
+         *BOUNDARY\n1,1,6\n*STEP\n*STATIC\n*CLOAD\n{load}\n*END STEP\n"
     );
     solve(&deck).remove(0).displacements
 }
 
 #[test]
 fn beams_that_meet_at_an_angle_turn_there_as_one() {
-    let down = corner("SECTION=RECT\n.1,.1", "B32", "", "5,3,1e-4");
+    let down = corner("SECTION=RECT\n.1,.1", "B32", "5,3,1e-4");
     near(down[2].z, 0.008_738_254, 1e-8);
     near(down[4].z, 0.060_282_43, 5e-8);
-    let bent = corner("SECTION=RECT\n.1,.1", "B32", "", "5,6,1e-4");
+    let bent = corner("SECTION=RECT\n.1,.1", "B32", "5,6,1e-4");
     near(bent[4].x, -0.043_579_23, 5e-8);
-    let beside = corner("SECTION=RECT,OFFSET1=.5,OFFSET2=-.3\n.1,.1", "B32", "", "5,1,1e-4");
+    let beside = corner("SECTION=RECT,OFFSET1=.5,OFFSET2=-.3\n.1,.1", "B32", "5,1,1e-4");
     near(beside[4].x, 0.030_232_43, 5e-8);
     near(beside[4].z, 0.000_876_016, 1e-8);
-    let far = corner("SECTION=RECT\n.1,.1", "B32", ",NLGEOM", "5,3,1e-3");
-    let there = DVec3::new(-0.028_206_37, -0.107_739_2, 0.502_464);
-    near(far[4].distance(there), 0.0, 2e-5);
 }
 
 /// A shell does not resist what turns it about its normal, and has a middle that is somewhere.
@@ -575,9 +254,9 @@ fn hinges_of_shells_hold_their_middle() {
 
 #[test]
 fn ellipses_bend_as_their_solids_do() {
-    let full = corner("SECTION=CIRC\n.1,.12", "B32", "", "5,3,1e-4");
+    let full = corner("SECTION=CIRC\n.1,.12", "B32", "5,3,1e-4");
     near(full[4].z, 0.066_216_87, 5e-8);
-    let reduced = corner("SECTION=CIRC\n.1,.12", "B32R", "", "5,3,1e-4");
+    let reduced = corner("SECTION=CIRC\n.1,.12", "B32R", "5,3,1e-4");
     // CalculiX integrates reduced beams by fifty points, we by eight.
     near(reduced[4].z / 0.071_549_42, 1.0, 5e-3);
 }

@@ -1,20 +1,14 @@
 //! One element: its stiffness, its forces, its stresses.
 
 use glam::DVec3;
-use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, Vector3, Vector6};
+use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
 
 use super::{
     law::Elastic,
-    model::{Cell, Deck, Material, Orientation, Step},
-    plastic::{Flow, Metal},
+    model::{Cell, Deck, Material, Orientation},
     shape::{Jet, Point, Shape, face_functions, face_places},
 };
 use crate::tensor::{self, Frame, Tangent, Voigt};
-
-/// Newton's steps to where bubbles bear nothing.
-const STEPS: usize = 20;
-/// Change of theirs, over the size of the element, whose square is nothing.
-const SETTLED: f64 = 1e-8;
 
 /// An element that is flat or turned inside out.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -44,34 +38,21 @@ pub(super) struct Warmth {
 /// An element with the places of its nodes.
 #[derive(Clone)]
 pub(super) struct Element<'a> {
-    deck: &'a Deck,
     cell: &'a Cell,
     material: &'a Material,
     orientation: Option<&'a Orientation>,
     places: Vec<DVec3>,
-    /// Points of its shape.
-    rule: fn(Shape) -> Vec<Point>,
 }
 
 impl<'a> Element<'a> {
-    /// A cell, of what a step says that it is made of.
-    pub(super) fn new(deck: &'a Deck, step: &Step, e: usize) -> Self {
+    pub(super) fn new(deck: &'a Deck, e: usize) -> Self {
         let cell = &deck.cells[e];
-        let material = step.materials.get(&(e as u32)).unwrap_or(&cell.material);
         Self {
-            deck,
             cell,
-            material: &deck.materials[*material as usize],
+            material: &deck.materials[cell.material as usize],
             orientation: cell.orientation.map(|o| &deck.orientations[o as usize]),
             places: cell.nodes.iter().map(|&n| deck.nodes[n as usize]).collect(),
-            rule: Shape::points,
         }
-    }
-
-    /// The element by points enough for motions that its own do not feel.
-    pub(super) fn finest(mut self) -> Self {
-        self.rule = Shape::finest_points;
-        self
     }
 
     pub(super) fn shape(&self) -> Shape {
@@ -121,20 +102,9 @@ impl<'a> Element<'a> {
     /// Points of integration.
     pub(super) fn points(&self) -> Vec<Point> {
         if self.cell.points.is_empty() {
-            (self.rule)(self.cell.shape)
+            self.cell.shape.points()
         } else {
             self.cell.points.clone()
-        }
-    }
-
-    /// Material and axes at a point of integration.
-    fn matter(&self, point: usize) -> (&Material, Option<&Orientation>) {
-        match self.cell.layers.get(point) {
-            None => (self.material, self.orientation),
-            Some(&(material, axes)) => (
-                &self.deck.materials[material as usize],
-                axes.map(|o| &self.deck.orientations[o as usize]),
-            ),
         }
     }
 
@@ -146,11 +116,10 @@ impl<'a> Element<'a> {
     /// The law at a point of integration, and the strain of free swelling there.
     fn local(&self, point: usize, at: &At, warmth: &Warmth) -> (Tangent, Voigt) {
         let [now, cold] = self.warmth(point, at, warmth);
-        let (material, axes) = self.matter(point);
-        let law = material.elastic.as_ref().map_or([[0.0; 6]; 6], |l| l.stiffness(now));
-        let free = material.expansion.as_ref().map_or([0.0; 3], |l| l.strain(now, cold));
+        let law = self.material.elastic.as_ref().map_or([[0.0; 6]; 6], |l| l.stiffness(now));
+        let free = self.material.expansion.as_ref().map_or([0.0; 3], |l| l.strain(now, cold));
         let free = [free[0], free[1], free[2], 0.0, 0.0, 0.0];
-        let (law, free) = match axes.map(|o| o.frame(at.place)) {
+        let (law, free) = match self.frame(at.place) {
             None => (law, free),
             Some(frame) => (
                 tensor::rotate_tangent(&law, &frame),
@@ -329,220 +298,16 @@ impl<'a> Element<'a> {
         points.map(stress).collect()
     }
 
-    /// The element where its nodes have gone to.
-    pub(super) fn moved(&self, by: &[f64]) -> Self {
-        let mut moved = self.clone();
-        let by = by.as_chunks::<3>().0.iter().copied().map(DVec3::from_array);
-        moved.places.iter_mut().zip(by).for_each(|(place, u)| *place += u);
-        moved
-    }
-
     /// The place where its functions are these.
     pub(super) fn place(&self, jets: &[Jet]) -> DVec3 {
         jets.iter().zip(&self.places).map(|(j, &x)| j.value * x).sum()
     }
 
-    /// A point where displacements are large: how its surroundings are deformed beside what warms
-    /// them, and the stress of that along them (second Piola-Kirchhoff), by the law as it is for
-    /// small strains (St. Venant and Kirchhoff). `self` is the element as it was; where it has bubbles,
-    /// `moved` has them after its nodes.
-    fn stretched(
-        &self,
-        moved: &Self,
-        (p, (natural, weight)): (usize, Point),
-        warmth: &Warmth,
-        initial: &impl Fn(usize) -> Voigt,
-        flow: &[Flow],
-    ) -> Result<Stretched, Folded> {
-        let mut at = self.strained(natural, weight)?;
-        let (law, free) = self.local(p, &at, warmth);
-        let metal = self.metal(p, self.warmth(p, &at, warmth)[0]);
-        let swelling = swelling(&free);
-        let inverse = swelling.try_inverse().ok_or(Folded)?;
-        for slope in &mut at.slopes {
-            let along = inverse * Vector3::new(slope[0], slope[1], slope[2]);
-            *slope = [along.x, along.y, along.z];
-        }
-        let column = |j: usize| -> DVec3 {
-            at.slopes.iter().zip(&moved.places).map(|(slope, &x)| slope[j] * x).sum()
-        };
-        let [x, y, z]: [DVec3; 3] = std::array::from_fn(column);
-        let volume = x.cross(y).dot(z) * swelling.determinant();
-        if volume.is_nan() || volume <= 0.0 {
-            return Err(Folded);
-        }
-        // Green's strain.
-        let half = |a: DVec3| 0.5 * (a.length_squared() - 1.0);
-        let strain = [half(x), half(y), half(z), x.dot(y), y.dot(z), z.dot(x)];
-        let flow = flow.get(p).copied().unwrap_or_default();
-        let (stress, law, flow) = match (metal, &self.matter(p).0.finite) {
-            (Some(metal), _) => metal.tangent(&strain, &flow).ok_or(Folded)?,
-            (None, Some(finite)) => {
-                let (stress, law) = finite.tangent(&strain).ok_or(Folded)?;
-                (stress, law, flow)
-            }
-            (None, None) => (tensor::apply(&law, &strain), law, flow),
-        };
-        let stress = tensor::add(&stress, &initial(p));
-        Ok(Stretched { at, law, axes: [x, y, z], volume, stress, flow })
-    }
-
-    /// What flows at a point of integration, if it does.
-    fn metal(&self, point: usize, temperature: f64) -> Option<Metal<'_>> {
-        let (material, _) = self.matter(point);
-        match (&material.plastic, &material.elastic) {
-            (Some(hardening), Some(Elastic::Isotropic(table))) => {
-                Some(Metal { elastic: table.at(temperature), hardening })
-            }
-            _ => None,
-        }
-    }
-
-    /// Tangent and what the inside pushes back with, where displacements are large.
-    pub(super) fn large(
-        &self,
-        moved: &Self,
-        warmth: &Warmth,
-        initial: impl Fn(usize) -> Voigt,
-        flow: &[Flow],
-        k: &mut [f64],
-        f: &mut [f64],
-    ) -> Result<(), Folded> {
-        if self.cell.shape != Shape::Hex8Bubbles {
-            return self.pushed(moved, warmth, &initial, flow, k, f);
-        }
-        let (_, all, forces) = self.filled(moved, warmth, &initial, flow)?;
-        condensed(&all, &forces, k, f)
-    }
-
-    /// The moved element with its bubbles where they bear nothing, and tangent and forces there.
-    fn filled(
-        &self,
-        moved: &Self,
-        warmth: &Warmth,
-        initial: &impl Fn(usize) -> Voigt,
-        flow: &[Flow],
-    ) -> Result<(Self, DMatrix<f64>, DVector<f64>), Folded> {
-        let mut filled = moved.clone();
-        filled.places.extend([DVec3::ZERO; 3]);
-        let (n, size) = (3 * self.places.len(), 3 * filled.places.len());
-        let small = SETTLED * self.places[0].distance(self.places[6]);
-        for _ in 0..STEPS {
-            let (mut all, mut forces) = (DMatrix::zeros(size, size), DVector::zeros(size));
-            let (k, f) = (all.as_mut_slice(), forces.as_mut_slice());
-            self.pushed(&filled, warmth, initial, flow, k, f)?;
-            let inside = all.view((n, n), (9, 9)).into_owned().lu();
-            let change = inside.solve(&forces.rows(n, 9).into_owned()).ok_or(Folded)?;
-            let changes = change.as_slice().as_chunks::<3>().0.iter();
-            let bubbles = filled.places.iter_mut().skip(self.places.len());
-            bubbles.zip(changes).for_each(|(place, by)| *place += DVec3::from_array(*by));
-            if change.norm() <= small {
-                return Ok((filled, all, forces));
-            }
-        }
-        Err(Folded)
-    }
-
-    /// Sums over the points, where bubbles are where `moved` has them.
-    fn pushed(
-        &self,
-        moved: &Self,
-        warmth: &Warmth,
-        initial: &impl Fn(usize) -> Voigt,
-        flow: &[Flow],
-        k: &mut [f64],
-        f: &mut [f64],
-    ) -> Result<(), Folded> {
-        let n = moved.places.len();
-        for point in self.points().into_iter().enumerate() {
-            let Stretched { at, law, axes, stress, .. } =
-                self.stretched(moved, point, warmth, initial, flow)?;
-            let all: Vec<[Voigt; 3]> = at.slopes.iter().map(|s| turned(&axes, s)).collect();
-            for (a, own) in all.iter().enumerate() {
-                let pulled = DVec3::from_array(transposed_times(&at.slopes[a], &stress));
-                for (i, strain) in own.iter().enumerate() {
-                    let row = 3 * a + i;
-                    f[row] -= at.volume * tensor::dot(&stress, strain);
-                    let borne = tensor::apply(&law, strain);
-                    for (b, others) in all.iter().enumerate() {
-                        for (j, other) in others.iter().enumerate() {
-                            k[row * 3 * n + 3 * b + j] += at.volume * tensor::dot(&borne, other);
-                        }
-                        let along = at.volume * pulled.dot(DVec3::from_array(at.slopes[b]));
-                        k[row * 3 * n + 3 * b + i] += along;
-                    }
-                }
-            }
-        }
-        Ok(())
-    }
-
-    /// Stress at every point in what is there (Cauchy), and what has flowed, where displacements are
-    /// large.
-    pub(super) fn true_stresses(
-        &self,
-        moved: &Self,
-        warmth: &Warmth,
-        initial: impl Fn(usize) -> Voigt,
-        flow: &[Flow],
-    ) -> Result<Vec<(Voigt, Flow)>, Folded> {
-        let filled = match self.cell.shape {
-            Shape::Hex8Bubbles => self.filled(moved, warmth, &initial, flow)?.0,
-            _ => moved.clone(),
-        };
-        let stress = |point| {
-            let there = self.stretched(&filled, point, warmth, &initial, flow)?;
-            let [x, y, z] = there.axes.map(|a| Vector3::new(a.x, a.y, a.z));
-            let deformed = Matrix3::from_columns(&[x, y, z]);
-            let s = there.stress;
-            let along = Matrix3::new(s[0], s[3], s[5], s[3], s[1], s[4], s[5], s[4], s[2]);
-            let t = deformed * along * deformed.transpose() / there.volume;
-            let stress = [t[(0, 0)], t[(1, 1)], t[(2, 2)], t[(0, 1)], t[(1, 2)], t[(2, 0)]];
-            Ok((stress, there.flow))
-        };
-        self.points().into_iter().enumerate().map(stress).collect()
-    }
-
-    /// What the forces of a pressure gain less as its face turns and grows: the symmetric part of
-    /// it, which is all of it where the pressure ends at supports (Hibbitt 1979).
-    pub(super) fn pressure_stiffness(&self, face: usize, pressure: f64, k: &mut [f64]) {
-        let Some(nodes) = self.cell.shape.faces().nth(face) else { return };
-        let size = 3 * self.places.len();
-        for (natural, weight) in self.cell.shape.face_points(nodes.len()) {
-            let jets = face_functions(nodes.len(), natural);
-            let along = |i: usize| -> DVec3 {
-                jets.iter().zip(nodes).map(|(j, &n)| j.slope[i] * self.places[n]).sum()
-            };
-            let [first, second] = [along(0), along(1)];
-            for (a, &own) in jets.iter().zip(nodes) {
-                for (b, &other) in jets.iter().zip(nodes) {
-                    // δ(x₁ × x₂) = (b₂ x₁ − b₁ x₂) × δu.
-                    let v = 0.5
-                        * pressure
-                        * weight
-                        * a.value
-                        * (b.slope[1] * first - b.slope[0] * second);
-                    let cross = [[0.0, -v.z, v.y], [v.z, 0.0, -v.x], [-v.y, v.x, 0.0]];
-                    for (i, row) in cross.iter().enumerate() {
-                        for (j, value) in row.iter().enumerate() {
-                            k[(3 * own + i) * size + 3 * other + j] += value;
-                            k[(3 * other + j) * size + 3 * own + i] += value;
-                        }
-                    }
-                }
-            }
-        }
-    }
-
-    /// Forces of what acts on every piece of its volume, N/m³ by point.
-    pub(super) fn volume_force(
-        &self,
-        density: impl Fn(&At) -> DVec3,
-        f: &mut [f64],
-    ) -> Result<(), Folded> {
+    /// Forces of what acts on every piece of its volume, N/m³.
+    pub(super) fn volume_force(&self, density: DVec3, f: &mut [f64]) -> Result<(), Folded> {
         for (natural, weight) in self.points() {
             let at = self.strained(natural, weight)?;
-            let force = at.volume * density(&at);
+            let force = at.volume * density;
             for (jet, f) in at.jets.iter().zip(f.as_chunks_mut::<3>().0) {
                 f.iter_mut().zip(force.to_array()).for_each(|(f, q)| *f += jet.value * q);
             }
@@ -575,16 +340,11 @@ impl<'a> Element<'a> {
         }
     }
 
-    /// ∫ ρ N Nᵀ, row by row, by the points that `of` says of its shape where it has none of its own.
-    pub(super) fn mass(
-        &self,
-        of: impl Fn(Shape) -> Vec<Point>,
-        warmth: &Warmth,
-        m: &mut [f64],
-    ) -> Result<(), Folded> {
+    /// ∫ ρ N Nᵀ, row by row.
+    pub(super) fn mass(&self, warmth: &Warmth, m: &mut [f64]) -> Result<(), Folded> {
         let n = self.places.len();
         let own = &self.cell.points;
-        let points = if own.is_empty() { of(self.cell.shape) } else { own.clone() };
+        let points = if own.is_empty() { self.cell.shape.fine_points() } else { own.clone() };
         for (natural, weight) in points {
             let at = self.at(natural, weight)?;
             let density = self.density(at.value(&warmth.now));
@@ -617,19 +377,6 @@ impl<'a> Element<'a> {
     }
 }
 
-/// A point where displacements are large.
-struct Stretched {
-    /// As it was, but for slopes: by lengths that what warms them has changed.
-    at: At,
-    law: Tangent,
-    /// Where unit lengths along x, y, z have gone to, but for warmth.
-    axes: [DVec3; 3],
-    /// Over what it was.
-    volume: f64,
-    stress: Voigt,
-    flow: Flow,
-}
-
 /// Adds what is left of nodes and nine unknowns of bubbles: these bear no force from outside, so that
 /// what they do follows from the rest.
 fn condensed(
@@ -649,21 +396,6 @@ fn condensed(
         f[i] += forces[i] - pushed[i];
     }
     Ok(())
-}
-
-/// 1 + free strain, as a matrix.
-fn swelling(free: &Voigt) -> Matrix3<f64> {
-    let [xy, yz, zx] = [0.5 * free[3], 0.5 * free[4], 0.5 * free[5]];
-    Matrix3::new(1.0 + free[0], xy, zx, xy, 1.0 + free[1], yz, zx, yz, 1.0 + free[2])
-}
-
-/// Changes of Green's strain by those of a node along x, y, z.
-fn turned([x, y, z]: &[DVec3; 3], s: &[f64; 3]) -> [Voigt; 3] {
-    std::array::from_fn(|i| {
-        let (x, y, z) = (x[i], y[i], z[i]);
-        let shears = [x * s[1] + y * s[0], y * s[2] + z * s[1], z * s[0] + x * s[2]];
-        [x * s[0], y * s[1], z * s[2], shears[0], shears[1], shears[2]]
-    })
 }
 
 /// All pairs of so many.

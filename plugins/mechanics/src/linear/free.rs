@@ -60,11 +60,6 @@ impl<'a> Free<'a> {
         number
     }
 
-    /// From now on nothing but what is free moves anything.
-    pub(super) fn settle(&mut self) {
-        self.sums.iter_mut().for_each(|sum| sum.constant = 0.0);
-    }
-
     /// How many are solved for.
     pub(super) fn count(&self) -> usize {
         self.order.len()

@@ -12,7 +12,7 @@ use super::{
     groups::{Action, Groups, Load, Material as Given, Support},
     law::{Elastic, Expansion, Table},
     mesh::MAX_COUNT,
-    model::{Cell, Deck, Material, Pull, Step},
+    model::{Cell, Deck, Material, Step},
     shape::Shape,
 };
 use crate::read::{Fault, ReadError, Units, gmsh, quote};
@@ -256,7 +256,6 @@ impl<'a> Builder<'a> {
                 orientation: None,
                 across: 0.0,
                 points: Vec::new(),
-                layers: Vec::new(),
             });
         }
     }
@@ -365,7 +364,7 @@ impl<'a> Builder<'a> {
     fn pull(&mut self, faces: &[(u32, usize)], traction: DVec3) {
         for &(cell, face) in faces {
             let nodes = face_nodes(&self.deck.cells[cell as usize], face);
-            let element = Element::new(&self.deck, &self.step, cell as usize);
+            let element = Element::new(&self.deck, cell as usize);
             for (jets, area) in element.face_points(face) {
                 let force = area.length() * traction;
                 for (jet, &node) in jets.iter().zip(&nodes) {
@@ -382,7 +381,7 @@ impl<'a> Builder<'a> {
         if self.elements[*first as usize].dimension == 2 {
             let faces = self.sides(group, false);
             let area = faces.iter().map(|&(cell, face)| {
-                let element = Element::new(&self.deck, &self.step, cell as usize);
+                let element = Element::new(&self.deck, cell as usize);
                 element.face_points(face).iter().map(|p| p.1.length()).sum::<f64>()
             });
             let area: f64 = area.sum();
@@ -428,8 +427,7 @@ impl<'a> Builder<'a> {
             None => (0..self.deck.cells.len() as u32).collect(),
         };
         self.lacks(place, &cells, |m| m.density.is_none(), "weight", "density_kg_m3");
-        let pull = Pull::Weight(acceleration);
-        self.step.pulls.extend(cells.into_iter().map(|c| (c, pull)));
+        self.step.pulls.extend(cells.into_iter().map(|c| (c, acceleration)));
     }
 
     /// What is warmed says how it swells.

@@ -15,7 +15,6 @@ use super::{
     free::Free,
     law::Table,
     model::{Cell, Deck, Heated, Heating, Step},
-    modes::{self, Failed},
     shape::Shape,
     solve::{LinearError, Solved},
 };
@@ -52,7 +51,6 @@ pub(super) fn solve(
     for (&node, &value) in &step.temperatures {
         temperatures[node as usize] = value;
     }
-    deck.spread(temperatures);
     match time {
         None => *temperatures = body.settled(temperatures, None, job)?,
         Some(times) => body.march(temperatures, times, job)?,
@@ -63,26 +61,6 @@ pub(super) fn solve(
         unknowns: body.free.count(),
         ..Solved::default()
     })
-}
-
-/// The smallest rates at which differences of temperature decay.
-pub(super) fn modes(
-    deck: &Deck,
-    step: &Step,
-    count: usize,
-    job: &Job,
-) -> Result<Solved, LinearError> {
-    let body = Body::new(deck, step);
-    let cold = &deck.cold;
-    let (conduction, _) = body.assembled(job, |e, k, f| body.flow(e, cold, k, f))?;
-    let (capacity, _) = body.assembled(job, |e, m, _| body.capacity(e, cold, m))?;
-    let found = modes::smallest(conduction, &capacity, count, job).map_err(|e| match e {
-        Failed::Solve(error) => error.into(),
-        _ => body.lost("eigenvalues"),
-    })?;
-    let eigenvalues = found.into_iter().map(|m| m.value).collect();
-    let unknowns = body.free.count();
-    Ok(Solved { name: step.name.clone(), eigenvalues, unknowns, ..Solved::default() })
 }
 
 /// What is heated in a step.
@@ -97,10 +75,8 @@ struct Body<'a> {
 impl<'a> Body<'a> {
     fn new(deck: &'a Deck, step: &'a Step) -> Self {
         let sum = |node: u32| {
-            // Flat elements have the temperature of their middle.
-            let owner = deck.twins.get(&node).copied().unwrap_or(node);
-            let is_held = step.temperatures.contains_key(&owner);
-            let terms = if is_held { Vec::new() } else { vec![(owner, 1.0)] };
+            let is_held = step.temperatures.contains_key(&node);
+            let terms = if is_held { Vec::new() } else { vec![(node, 1.0)] };
             // Newton's method asks for changes, which are none where it is held.
             Sum { terms, constant: 0.0 }
         };
@@ -147,7 +123,6 @@ impl<'a> Body<'a> {
             let found = direct(&matrix, &rhs, &none, Method::Direct, 1e-7, job);
             let change = found.map_err(|error| self.explained(error))?.x;
             self.free.order().iter().zip(&change).for_each(|(&n, d)| now[n as usize] += d);
-            self.deck.spread(&mut now);
             let largest = |all: &[f64]| all.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
             if linear || largest(&change) <= SETTLED * largest(&now) {
                 return Ok(now);
@@ -176,7 +151,6 @@ impl<'a> Body<'a> {
                 && all.into_iter().flatten().all(Table::is_constant)
         };
         self.deck.cells.iter().all(constant)
-            && self.step.materials.is_empty()
             && self.step.heating.keys().all(|h| h.0 != Heating::Radiation)
     }
 
@@ -235,7 +209,7 @@ impl<'a> Body<'a> {
 
     /// Tangent and what flows into the nodes: conduction and everything that heats the element.
     fn flow(&self, e: usize, all: &[f64], k: &mut [f64], f: &mut [f64]) -> Result<(), Folded> {
-        let (element, own) = (Element::new(self.deck, self.step, e), self.own(e, all));
+        let (element, own) = (Element::new(self.deck, e), self.own(e, all));
         let n = own.len();
         let loads = self.loads.get(&(e as u32)).map_or(&[][..], Vec::as_slice);
         let volume: f64 = loads.iter().filter(|l| l.0.0 == Heating::Volume).map(|l| l.1[0]).sum();
@@ -310,7 +284,7 @@ impl<'a> Body<'a> {
 
     /// ∫ ρc N Nᵀ.
     fn capacity(&self, e: usize, all: &[f64], m: &mut [f64]) -> Result<(), Folded> {
-        let (element, own) = (Element::new(self.deck, self.step, e), self.own(e, all));
+        let (element, own) = (Element::new(self.deck, e), self.own(e, all));
         let n = own.len();
         for (natural, weight) in warmed(&element).fine_points() {
             let at = element.at(natural, weight)?;

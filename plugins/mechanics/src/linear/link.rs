@@ -1,17 +1,9 @@
-//! What joins nodes without a solid: springs, rigid bodies, mean rotations, loads shared among
-//! nodes, and cuts that are pulled together.
-
-use std::collections::{BTreeMap, BTreeSet};
-
-use glam::DVec3;
+//! What joins nodes without a solid: springs.
 
 use super::{
-    constraint::Equation,
-    curve::{Curve, Curved, terms},
-    matter::all_numbers,
-    mesh::name_of,
-    model::{Gap, Spring},
-    read::{Kind, Reader, Surface, plain},
+    model::Spring,
+    read::{Kind, Reader, plain},
+    turn::terms,
 };
 use crate::read::{
     Fault,
@@ -28,14 +20,6 @@ pub(super) enum Link {
     Ground,
     /// SPRING2: a component of one node to a component of another.
     Components,
-    /// DASHPOTA: along the line between two nodes.
-    Damper,
-    /// A B31 that a `*PRE-TENSION SECTION` stands for.
-    Bolt,
-    /// GAPUNI: bears along a direction once two nodes have come near.
-    Gap,
-    /// DCOUP3D: the node of a `*DISTRIBUTING COUPLING`.
-    Coupling,
 }
 
 impl Link {
@@ -44,17 +28,14 @@ impl Link {
             "SPRINGA" => Some(Self::Between),
             "SPRING1" => Some(Self::Ground),
             "SPRING2" => Some(Self::Components),
-            "DASHPOTA" => Some(Self::Damper),
-            "GAPUNI" => Some(Self::Gap),
-            "DCOUP3D" => Some(Self::Coupling),
             _ => None,
         }
     }
 
     pub(super) fn nodes(self) -> usize {
         match self {
-            Self::Between | Self::Damper | Self::Components | Self::Gap | Self::Bolt => 2,
-            Self::Ground | Self::Coupling => 1,
+            Self::Between | Self::Components => 2,
+            Self::Ground => 1,
         }
     }
 }
@@ -63,30 +44,20 @@ impl Reader {
     pub(super) fn linked(&mut self, card: &Card<'_>) -> Result<(), Fault> {
         match plain(card).as_str() {
             "SPRING" => self.spring(card),
-            "DASHPOT" => self.dashpot(card),
-            "GAP" => self.gap(card),
-            "MPC" => self.multiple(card),
-            "RIGIDBODY" => self.rigid_body(card),
-            "DISTRIBUTINGCOUPLING" => self.coupling(card),
             _ => Ok(()),
         }
     }
 
     fn spring(&mut self, card: &Card<'_>) -> Result<(), Fault> {
-        card.only(&["ELSET", "NONLINEAR"])?;
+        card.only(&["ELSET"])?;
         let elements = self.named_elements(card)?;
         let rows: Vec<Row<'_>> = card.rows().collect();
         let first = rows.first().ok_or_else(|| card.fault("needed is: stiffness"))?;
-        let law = if card.get("NONLINEAR").is_some() { self.law(card)? } else { Vec::new() };
         for element in elements {
             let raw = self.raw[element as usize].clone();
-            let Kind::Link(link @ (Link::Between | Link::Ground | Link::Components)) = raw.kind
-            else {
+            let Kind::Link(link) = raw.kind else {
                 return Err(card.fault(format!("element {} is no spring", raw.label)));
             };
-            if !law.is_empty() && link != Link::Between {
-                return Err(card.fault("NONLINEAR is of SPRINGA"));
-            }
             let components = match link {
                 Link::Between => Vec::new(),
                 _ => first.fields().map(|w| direction(w, *first)).collect::<Result<_, _>>()?,
@@ -98,88 +69,7 @@ impl Reader {
             let terms = terms.ok_or_else(|| {
                 card.fault(format!("spring {} has no length, or no component", raw.label))
             })?;
-            let ends: Option<[u32; 2]> =
-                raw.nodes.as_slice().try_into().ok().filter(|_| link == Link::Between);
-            let (law, drag) = (law.clone(), Vec::new());
-            self.deck.springs.push(Spring { terms, ends, stiffness, law, drag, gap: None });
-            self.sprung.insert(element);
-        }
-        Ok(())
-    }
-
-    /// Force and elongation, line by line, to elongation and force.
-    fn law(&self, card: &Card<'_>) -> Result<Vec<(f64, f64)>, Fault> {
-        let mut law = Vec::new();
-        for row in card.rows() {
-            let [force, longer] = row.exactly("force, elongation")?;
-            let force = row.number(force)? * self.units.stress() * self.units.length().powi(2);
-            law.push((row.number(longer)? * self.units.length(), force));
-        }
-        let ascends = law.len() > 1 && law.is_sorted_by(|a, b| a.0 < b.0);
-        ascends.then_some(law).ok_or_else(|| card.fault("needed are two elongations, ascending"))
-    }
-
-    /// Force by speed, each with its frequency where it changes with that.
-    fn dashpot(&mut self, card: &Card<'_>) -> Result<(), Fault> {
-        card.only(&["ELSET"])?;
-        let mut drag = Vec::new();
-        for row in card.rows() {
-            let numbers = row.numbers("force by speed, frequency", 1..=2)?;
-            let frequency = numbers.get(1).copied().unwrap_or(0.0);
-            drag.push((frequency, numbers[0] * self.units.stress() * self.units.length()));
-        }
-        if drag.is_empty() || !drag.is_sorted_by(|a, b| a.0 < b.0) {
-            return Err(card.fault("needed are: force by speed, frequency, these ascending"));
-        }
-        for element in self.named_elements(card)? {
-            let raw = self.raw[element as usize].clone();
-            let found = match raw.kind {
-                Kind::Link(Link::Damper) => self.spring_terms(&raw.nodes, Link::Between, &[]),
-                _ => None,
-            };
-            let why =
-                || card.fault(format!("element {} is no dashpot, or has no length", raw.label));
-            let (terms, drag) = (found.ok_or_else(why)?, drag.clone());
-            let (ends, law, gap) = (None, Vec::new(), None);
-            self.deck.springs.push(Spring { terms, ends, stiffness: 0.0, law, drag, gap });
-            self.sprung.insert(element);
-        }
-        Ok(())
-    }
-
-    /// How wide it is, the direction in which it opens, stiffness once it has closed, and the pull
-    /// where it is far open.
-    fn gap(&mut self, card: &Card<'_>) -> Result<(), Fault> {
-        card.only(&["ELSET"])?;
-        let what = "clearance, x, y, z of the direction, , stiffness, pull";
-        let row = card.one_row()?.ok_or_else(|| card.fault(format!("needed are: {what}")))?;
-        let words: Vec<&str> = row.fields().collect();
-        let number = |i: usize, usual: f64| match words.get(i) {
-            Some(word) if !word.is_empty() => row.number(word),
-            _ => Ok(usual),
-        };
-        let direction = DVec3::new(number(1, 0.0)?, number(2, 0.0)?, number(3, 0.0)?);
-        let direction = direction.try_normalize().ok_or_else(|| row.fault("no direction"))?;
-        let (stiffness, pull) = (number(5, 1e12)?, number(6, 1e-3)?);
-        if words.len() > 7 || stiffness.is_nan() || stiffness <= 0.0 || pull.is_nan() || pull <= 0.0
-        {
-            return Err(row.fault(format!("needed are: {what}, the last two above 0")));
-        }
-        let length = self.units.length();
-        let gap = Gap {
-            clearance: number(0, 0.0)? * length,
-            stiffness: stiffness * self.units.stress() * length,
-            pull: pull * self.units.stress() * length * length,
-        };
-        for element in self.named_elements(card)? {
-            let raw = &self.raw[element as usize];
-            let (Kind::Link(Link::Gap), &[a, b]) = (raw.kind, raw.nodes.as_slice()) else {
-                return Err(card.fault(format!("element {} is no GAPUNI", raw.label)));
-            };
-            let terms = terms(&[(a, -direction), (b, direction)]);
-            let (ends, stiffness, law, drag) = (None, 0.0, Vec::new(), Vec::new());
-            let gap = Some(gap);
-            self.deck.springs.push(Spring { terms, ends, stiffness, law, drag, gap });
+            self.deck.springs.push(Spring { terms, stiffness });
             self.sprung.insert(element);
         }
         Ok(())
@@ -202,198 +92,6 @@ impl Reader {
             }
             _ => None,
         }
-    }
-
-    /// `MEANROT`: nodes, each for its three components, and the node whose place is the axis and
-    /// whose first component is the angle. `PLANE` and `STRAIGHT`: nodes that stay in one.
-    fn multiple(&mut self, card: &Card<'_>) -> Result<(), Fault> {
-        card.only(&[])?;
-        let mut rows = card.rows().peekable();
-        while let Some(row) = rows.next() {
-            let mut words = row.fields().filter(|w| !w.is_empty());
-            let kind = words.next().unwrap_or_default().to_ascii_uppercase();
-            let mut nodes = Vec::new();
-            for word in words {
-                nodes.extend(self.some_nodes(word, row)?);
-            }
-            while let Some(next) =
-                rows.next_if(|r| !r.text.starts_with(|c: char| c.is_ascii_alphabetic()))
-            {
-                for word in next.fields().filter(|w| !w.is_empty()) {
-                    nodes.push(self.node(word, next)?);
-                }
-            }
-            let curve = match kind.as_str() {
-                "MEANROT" => {
-                    let pilot = nodes.pop().ok_or_else(|| row.fault("MEANROT needs nodes"))?;
-                    nodes.dedup();
-                    let axis = self.deck.nodes[pilot as usize].try_normalize();
-                    let axis =
-                        axis.ok_or_else(|| row.fault("the axis of MEANROT has no length"))?;
-                    // The pilot is an angle: its unit is not that of lengths.
-                    Curve::Turn { nodes, axis, angle: 3 * pilot, unit: self.units.length() }
-                }
-                "PLANE" => Curve::Plane(nodes),
-                "STRAIGHT" => Curve::Straight(nodes),
-                other => {
-                    let other = quote(other);
-                    return Err(row.fault(format!(
-                        "*MPC: {other}: MEANROT, PLANE and STRAIGHT are supported"
-                    )));
-                }
-            };
-            if !self.bound(curve, row.line) {
-                let why = "lie on one axis, on one line, or are one";
-                return Err(row.fault(format!("*MPC: the nodes of {kind} {why}")));
-            }
-        }
-        Ok(())
-    }
-
-    /// Adds a constraint that is another where displacements are large, unless its nodes are too
-    /// few to say anything.
-    pub(super) fn bound(&mut self, curve: Curve, line: u32) -> bool {
-        let curved = Curved { curve, first: self.deck.equations.len(), line };
-        let Some(equations) = curved.equations(&self.deck.nodes, |_| 0.0) else { return false };
-        self.deck.equations.extend(equations);
-        self.deck.curved.push(curved);
-        true
-    }
-
-    /// Every node of the set moves and turns with the reference.
-    fn rigid_body(&mut self, card: &Card<'_>) -> Result<(), Fault> {
-        card.only(&["NSET", "ELSET", "REF NODE", "ROT NODE"])?;
-        if !card.rows().collect::<Vec<_>>().is_empty() {
-            return Err(card.fault("*RIGID BODY has no lines of data"));
-        }
-        let row = Row { line: card.line, text: "" };
-        let nodes: BTreeSet<u32> = match name_of(card, "NSET")? {
-            Some(set) => self.some_nodes(&set, row)?.into_iter().collect(),
-            None => {
-                let elements = self.named_elements(card)?;
-                elements.iter().flat_map(|&e| self.raw[e as usize].nodes.clone()).collect()
-            }
-        };
-        let reference = self.node(&card.need("REF NODE")?, row)?;
-        let turning = match name_of(card, "ROT NODE")? {
-            Some(word) => self.node(&word, row)?,
-            None => {
-                let turning = self.hidden_node(reference);
-                self.turning.insert(reference, turning);
-                turning
-            }
-        };
-        // Components of a node that turns are angles.
-        let unit = if self.turning.contains_key(&reference) { 1.0 } else { self.units.length() };
-        let nodes = nodes.into_iter().filter(|&n| n != reference && n != turning).collect();
-        let widens = Vec::new();
-        self.bound(Curve::Body { reference, turning, unit, nodes, widens }, card.line);
-        Ok(())
-    }
-
-    /// The node of a coupling moves as the weighted mean of others.
-    fn coupling(&mut self, card: &Card<'_>) -> Result<(), Fault> {
-        card.only(&["ELSET", "NAME"])?;
-        let elements = self.named_elements(card)?;
-        let mut weights: BTreeMap<u32, f64> = BTreeMap::new();
-        for row in card.rows() {
-            let [target, weight] = row.exactly("node or set, weight")?;
-            let weight = row.number(weight)?;
-            if weight.is_nan() || weight <= 0.0 {
-                return Err(row.fault("a weight must be above 0"));
-            }
-            self.some_nodes(target, row)?.into_iter().for_each(|n| {
-                weights.insert(n, weight);
-            });
-        }
-        let sum: f64 = weights.values().sum();
-        for element in elements {
-            let raw = &self.raw[element as usize];
-            let (Kind::Link(Link::Coupling), &[node]) = (raw.kind, raw.nodes.as_slice()) else {
-                return Err(card.fault(format!("element {} is no DCOUP3D", raw.label)));
-            };
-            for i in 0..3 {
-                let mut terms = vec![(3 * node + i, 1.0)];
-                terms.extend(weights.iter().map(|(n, w)| (3 * n + i, -w / sum)));
-                self.deck.equations.push(Equation { terms, value: 0.0, line: card.line });
-            }
-            self.sprung.insert(element);
-        }
-        Ok(())
-    }
-
-    /// `*PRE-TENSION SECTION`: the nodes of a surface are doubled. Elements on its side move as
-    /// those beyond it do, and by the first component of a node farther along the normal.
-    pub(super) fn cut(&mut self, card: &Card<'_>) -> Result<(), Fault> {
-        if plain(card) != "PRE-TENSIONSECTION" {
-            return Ok(());
-        }
-        card.only(&["SURFACE", "ELEMENT", "NODE"])?;
-        let row = Row { line: card.line, text: "" };
-        let pilot = self.node(&card.need("NODE")?, row)?;
-        let axis = match all_numbers(card)?.as_slice() {
-            &[x, y, z] => DVec3::new(x, y, z).try_normalize(),
-            _ => None,
-        };
-        let axis = axis.ok_or_else(|| card.fault("needed are: x, y, z of the normal"))?;
-        if let Some(element) = name_of(card, "ELEMENT")? {
-            return self.bolt(&element, pilot, axis, row);
-        }
-        let name = card.need("SURFACE")?;
-        let Some(Surface::Faces(faces)) = self.surfaces.get(&name) else {
-            return Err(card.fault(format!("surface {} of faces is not defined", quote(&name))));
-        };
-        let mut nodes = BTreeSet::new();
-        let mut own = BTreeSet::new();
-        for &(element, face) in faces {
-            own.insert(element);
-            nodes.extend(self.raw[element as usize].side(face));
-        }
-        let middle = |nodes: &[u32]| {
-            nodes.iter().map(|&n| self.deck.nodes[n as usize]).sum::<DVec3>() / nodes.len() as f64
-        };
-        let list: Vec<u32> = nodes.iter().copied().collect();
-        let at = middle(&list);
-        let side = |e: usize| (middle(&self.raw[e].nodes) - at).dot(axis) > 0.0;
-        let Some(&first) = own.first() else { return Ok(()) };
-        let inner = side(first as usize);
-        let touches = |e: &usize| self.raw[*e].nodes.iter().any(|n| nodes.contains(n));
-        let inside: Vec<usize> =
-            (0..self.raw.len()).filter(touches).filter(|&e| side(e) == inner).collect();
-        let twins: BTreeMap<u32, u32> = nodes.iter().map(|&n| (n, self.hidden_node(n))).collect();
-        for e in inside {
-            for node in &mut self.raw[e].nodes {
-                *node = twins.get(node).copied().unwrap_or(*node);
-            }
-        }
-        for (&node, &twin) in &twins {
-            for (i, along) in axis.to_array().into_iter().enumerate() {
-                let i = i as u32;
-                let mut terms = vec![(3 * twin + i, 1.0), (3 * node + i, -1.0)];
-                if along != 0.0 {
-                    terms.push((3 * pilot, -along));
-                }
-                self.deck.equations.push(Equation { terms, value: 0.0, line: card.line });
-            }
-        }
-        Ok(())
-    }
-
-    /// The beam that a bolt is leaves its place to its pull: its nodes come nearer along the axis by
-    /// the first component of another.
-    fn bolt(&mut self, element: &str, pilot: u32, axis: DVec3, row: Row<'_>) -> Result<(), Fault> {
-        let other = || row.fault(format!("element {} is no B31", quote(element)));
-        let &[number] = self.some_elements(element, row)?.as_slice() else { return Err(other()) };
-        let raw = &mut self.raw[number as usize];
-        let (Kind::Thin(_), &[a, b]) = (raw.kind, raw.nodes.as_slice()) else {
-            return Err(other());
-        };
-        raw.kind = Kind::Link(Link::Bolt);
-        self.sprung.insert(number);
-        let mut terms = terms(&[(a, axis), (b, -axis)]);
-        terms.push((3 * pilot, -1.0));
-        self.deck.equations.push(Equation { terms, value: 0.0, line: row.line });
-        Ok(())
     }
 
     /// A node that the deck does not name, at the place of another.

@@ -4,10 +4,8 @@ use glam::DVec3;
 use nalgebra::Matrix3;
 
 use super::{
-    finite::Finite,
     law::{Elastic, Expansion, Table},
     model::{Material, Orientation},
-    plastic::Hardening,
     read::{Kind, Reader, Section, plain},
     shape::Shape,
     thin::{Form, Profile, Thin},
@@ -35,17 +33,7 @@ impl Reader {
                 self.in_material = true;
                 Ok(())
             }
-            "ELASTIC"
-            | "DENSITY"
-            | "EXPANSION"
-            | "CONDUCTIVITY"
-            | "SPECIFICHEAT"
-            | "DAMPING"
-            | "PLASTIC"
-            | "CYCLICHARDENING"
-            | "HYPERELASTIC"
-            | "HYPERFOAM"
-            | "DEFORMATIONPLASTICITY" => {
+            "ELASTIC" | "DENSITY" | "EXPANSION" | "CONDUCTIVITY" | "SPECIFICHEAT" => {
                 if !in_material {
                     return Err(card.fault(format!("*{} must stand under a *MATERIAL", card.name)));
                 }
@@ -93,33 +81,6 @@ impl Reader {
                     return Err(card.fault(format!("conductivity must be above 0, not {k}")));
                 }
                 material.conductivity = Some(table);
-            }
-            "PLASTIC" => material.plastic = Some(hardening(card, units.stress())?),
-            "CYCLICHARDENING" => {
-                card.only(&[])?;
-                let after =
-                    || card.fault("*CYCLIC HARDENING stands after *PLASTIC, HARDENING=COMBINED");
-                let hardening = material.plastic.as_mut().filter(|h| !h.moves.is_empty());
-                hardening.ok_or_else(after)?.widens = yields(card, units.stress())?;
-            }
-            "HYPERELASTIC" | "HYPERFOAM" | "DEFORMATIONPLASTICITY" => {
-                let law = finite(card, name, &numbers, units.stress())?;
-                if matches!(law, Finite::Rubber { .. }) && numbers.last() == Some(&0.0) {
-                    let name = &material.name;
-                    let note =
-                        format!("material {name}: D = 0 stands for a Poisson's ratio of .475");
-                    self.deck.notes.push(note);
-                }
-                material.finite = Some(law);
-            }
-            "DAMPING" => {
-                card.only(&["ALPHA", "BETA"])?;
-                for (to, name) in material.damping.iter_mut().zip(["ALPHA", "BETA"]) {
-                    let Some(word) = card.get(name) else { continue };
-                    let found = word.parse().ok().filter(|d: &f64| *d >= 0.0);
-                    let wrong = || card.fault(format!("{name} is a number that is not below 0"));
-                    *to = found.ok_or_else(wrong)?;
-                }
             }
             _ => {
                 card.only(&[])?;
@@ -213,18 +174,6 @@ impl Reader {
             "SHELLSECTION" => self.shell_section(card),
             "BEAMSECTION" | "BEAMGENERALSECTION" => self.beam_section(card),
             "NORMAL" => self.normal(card),
-            "NODALTHICKNESS" => {
-                // No section asks for it, and CalculiX leaves it out as well.
-                self.deck.notes.push(format!(
-                    "line {}: *NODAL THICKNESS says nothing: thicknesses are those of sections",
-                    card.line
-                ));
-                Ok(())
-            }
-            // A set without elements needs no section.
-            "MEMBRANE" if self.element_sets.contains_key(&card.need("ELSET")?) => {
-                Err(card.fault("*MEMBRANE is not computed"))
-            }
             _ => Ok(()),
         }
     }
@@ -246,12 +195,6 @@ impl Reader {
         let is_bar = |e: &u32| self.raw[*e as usize].kind == Kind::Solid(Shape::Bar);
         if set.iter().any(is_bar) && all_numbers(card)?.first().copied().unwrap_or(0.0) <= 0.0 {
             return Err(card.fault("bars need the area of their section, above 0"));
-        }
-        if thickness.is_nan() || thickness <= 0.0 {
-            let flat = |e: &u32| matches!(self.raw[*e as usize].kind, Kind::Flat(_));
-            if set.iter().any(flat) {
-                return Err(card.fault("the thickness must be above 0"));
-            }
         }
         self.assign(card, &section, fits)
     }
@@ -292,7 +235,7 @@ impl Reader {
     }
 
     fn shell_section(&mut self, card: &Card<'_>) -> Result<(), Fault> {
-        card.only(&["ELSET", "MATERIAL", "ORIENTATION", "OFFSET", "COMPOSITE"])?;
+        card.only(&["ELSET", "MATERIAL", "ORIENTATION", "OFFSET"])?;
         let offset = match card.word("OFFSET").as_deref() {
             None => 0.0,
             Some("SPOS") => -0.5,
@@ -302,42 +245,19 @@ impl Reader {
                 found.ok_or_else(|| card.fault("OFFSET is a number, SPOS or SNEG"))?
             }
         };
-        let mut layers = Vec::new();
-        let mut thickness = 0.0;
-        for row in card.rows() {
-            let words: Vec<&str> = row.fields().collect();
-            let own = row.number(words[0])? * self.units.length();
-            if own.is_nan() || own <= 0.0 {
-                return Err(row.fault("a thickness must be above 0"));
-            }
-            thickness += own;
-            if card.get("COMPOSITE").is_none() {
-                continue;
-            }
-            let word = |i: usize| words.get(i).copied().filter(|w| !w.is_empty());
-            let material = word(2).ok_or_else(|| row.fault("needed are: thickness, , material"))?;
-            let axes = word(3).map(|name| self.axes_of(card, name)).transpose()?;
-            layers.push((own, self.named_material(card, material)?, axes));
+        let row =
+            card.one_row()?.ok_or_else(|| card.fault("*SHELL SECTION needs its thickness"))?;
+        let thickness = row.number(row.fields().next().unwrap_or_default())? * self.units.length();
+        if thickness.is_nan() || thickness <= 0.0 {
+            return Err(row.fault("a thickness must be above 0"));
         }
-        if thickness == 0.0 {
-            return Err(card.fault("*SHELL SECTION needs its thickness"));
-        }
-        let material = match layers.first() {
-            Some(layer) => layer.1,
-            None => self.named_material(card, &card.need("MATERIAL")?)?,
-        };
-        let layered = !layers.is_empty();
         let section = Section {
-            material,
+            material: self.named_material(card, &card.need("MATERIAL")?)?,
             orientation: self.named_orientation(card)?,
             thickness,
-            profile: Profile::Shell { offset, layers },
+            profile: Profile::Shell { offset },
         };
-        self.assign(card, &section, |kind| match kind {
-            // Layers have eight points each.
-            Kind::Thin(Thin::Shell { shape, .. }) => !layered || shape == Shape::Hex20Reduced,
-            _ => false,
-        })
+        self.assign(card, &section, |kind| matches!(kind, Kind::Thin(Thin::Shell { .. })))
     }
 
     fn beam_section(&mut self, card: &Card<'_>) -> Result<(), Fault> {
@@ -465,81 +385,6 @@ fn elastic(card: &Card<'_>, kind: &str, numbers: &[f64], unit: f64) -> Result<El
     };
     let all = law.all().into_iter().all(resists);
     all.then_some(law).ok_or_else(|| card.fault("*ELASTIC: this law gives way to some strain"))
-}
-
-/// True stress and plastic strain of each line.
-fn hardening(card: &Card<'_>, unit: f64) -> Result<Hardening, Fault> {
-    card.only(&["HARDENING"])?;
-    let table = yields(card, unit)?;
-    match card.word("HARDENING").as_deref() {
-        None | Some("ISOTROPIC") => Ok(Hardening::isotropic(table)),
-        // Of COMBINED a card that follows says how it widens.
-        Some("KINEMATIC" | "COMBINED") => Ok(Hardening::kinematic(table)),
-        Some(other) => {
-            let kinds = "ISOTROPIC, KINEMATIC and COMBINED are supported";
-            Err(card.fault(format!("HARDENING={}: {kinds}", quote(other))))
-        }
-    }
-}
-
-/// Plastic strain from 0 on, and true stress.
-fn yields(card: &Card<'_>, unit: f64) -> Result<Vec<(f64, f64)>, Fault> {
-    let mut table: Vec<(f64, f64)> = Vec::new();
-    for row in card.rows() {
-        let [stress, strain] = row.exactly("true stress, plastic strain")?;
-        table.push((row.number(strain)?, row.number(stress)? * unit));
-    }
-    let begins = table.first().is_some_and(|first| first.0 == 0.0 && first.1 > 0.0);
-    let grows = table.is_sorted_by(|a, b| a.0 < b.0 && a.1 <= b.1);
-    (begins && grows).then_some(table).ok_or_else(|| {
-        let name = &card.name;
-        card.fault(format!(
-            "*{name} begins at a plastic strain of 0 and a stress above 0; both grow"
-        ))
-    })
-}
-
-/// A law for strains that are not small, the same at every temperature.
-fn finite(card: &Card<'_>, name: &str, numbers: &[f64], unit: f64) -> Result<Finite, Fault> {
-    const KINDS: [&str; 3] = ["NEO HOOKE", "MOONEY-RIVLIN", "OGDEN"];
-    card.only(&[&KINDS[..], &["N"]].concat())?;
-    let count =
-        card.get("N").map_or(Some(1), |n| n.parse::<usize>().ok().filter(|n| (1..=3).contains(n)));
-    let count = count.ok_or_else(|| card.fault("N is a number from 1 to 3"))?;
-    let kind = KINDS.into_iter().find(|kind| card.get(kind).is_some());
-    let pairs = |all: &[f64]| -> Vec<[f64; 2]> {
-        all.as_chunks::<2>().0.iter().map(|[m, a]| [unit * m, *a]).collect()
-    };
-    let (first, rest) = numbers.split_at((2 * count).min(numbers.len()));
-    let volume = |all: &[f64]| all.iter().map(|d| d / unit).collect::<Vec<f64>>();
-    let law = match (name, kind, numbers) {
-        (_, Some("NEO HOOKE"), &[c, d]) => Finite::rubber(pairs(&[2.0 * c, 2.0]), &volume(&[d])),
-        (_, Some("MOONEY-RIVLIN"), &[c, e, d]) => {
-            Finite::rubber(pairs(&[2.0 * c, 2.0, 2.0 * e, -2.0]), &volume(&[d]))
-        }
-        (_, Some("OGDEN"), _) if rest.len() == count => Finite::rubber(pairs(first), &volume(rest)),
-        ("HYPERFOAM", None, _) if rest.len() == count => Finite::foam(&pairs(first), rest),
-        ("DEFORMATIONPLASTICITY", None, &[young, poisson, yields, exponent, offset]) => {
-            let known = young > 0.0
-                && poisson > -1.0
-                && poisson < 0.5
-                && yields > 0.0
-                && exponent >= 1.0
-                && offset >= 0.0;
-            let (elastic, yields) = ([unit * young, poisson], unit * yields);
-            known.then_some(Finite::Curve { elastic, yields, exponent, offset })
-        }
-        _ => None,
-    };
-    law.ok_or_else(|| {
-        let kinds =
-            "NEO HOOKE (C, D), MOONEY-RIVLIN (C, C, D) and OGDEN (μ, α of N terms, N times D)";
-        card.fault(match name {
-            "HYPERELASTIC" => format!("*HYPERELASTIC is {kinds}, at one temperature"),
-            "HYPERFOAM" => "*HYPERFOAM is μ, α of N terms, N times ν, at one temperature".into(),
-            _ => "*DEFORMATION PLASTICITY is E, ν, σ₀, n, α, at one temperature".into(),
-        })
-    })
 }
 
 /// E₁, E₂, E₃, ν₁₂, ν₁₃, ν₂₃, G₁₂, G₁₃, G₂₃ to the constants of [`Elastic::Orthotropic`].

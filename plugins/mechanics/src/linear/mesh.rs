@@ -5,7 +5,6 @@ use std::ops::RangeInclusive;
 use glam::DVec3;
 
 use super::{
-    flat::{Flat, Plane, SLICE, Sides, thicken},
     link::Link,
     model::Cell,
     read::{Kind, Raw, Reader, Section, Surface, plain},
@@ -42,32 +41,13 @@ pub(super) fn kind(name: &str) -> Option<Kind> {
     if let Some(link) = Link::of(name) {
         return Some(Kind::Link(link));
     }
-    if let Some(thin) = Thin::of(name) {
-        return Some(Kind::Thin(thin));
-    }
-    let (family, nodes) = name.split_at_checked(3)?;
-    let plane = match family {
-        "CPS" => Plane::Stress,
-        "CPE" => Plane::Strain,
-        "CAX" => Plane::Around,
-        _ => return None,
-    };
-    let (corners, shape) = match nodes {
-        "3" => (3, Shape::Wedge6),
-        "4" => (4, Shape::Hex8),
-        "6" => (3, Shape::Wedge15),
-        "8" => (4, Shape::Hex20),
-        "8R" => (4, Shape::Hex20Reduced),
-        _ => return None,
-    };
-    Some(Kind::Flat(Flat { plane, corners, shape }))
+    Thin::of(name).map(Kind::Thin)
 }
 
 impl Kind {
     fn nodes(self) -> usize {
         match self {
             Self::Solid(shape) => shape.nodes(),
-            Self::Flat(flat) => flat.nodes(),
             Self::Link(link) => link.nodes(),
             Self::Thin(thin) => thin.nodes(),
         }
@@ -78,10 +58,6 @@ impl Kind {
         match self {
             Self::Solid(shape) => {
                 (1..=shape.faces().len()).contains(&usize::from(number)).then(|| number - 1)
-            }
-            // Sides of a plane follow the two faces that close it.
-            Self::Flat(flat) => {
-                (1..=flat.corners).contains(&usize::from(number)).then_some(number + 1)
             }
             Self::Link(_) | Self::Thin(_) => None,
         }
@@ -287,9 +263,6 @@ impl Reader {
             return Err(Fault::at(raw.line, why));
         }
         self.ring()?;
-        // Beside what is axially symmetric, the slice has its share of a plane of some thickness.
-        let share = if self.is_around() { SLICE / 360.0 } else { 1.0 };
-        let mut sides = Sides::new();
         for i in 0..self.raw.len() {
             let raw = &self.raw[i];
             let Some(section) = &raw.section else { continue };
@@ -301,12 +274,6 @@ impl Reader {
                     let across = section.thickness * self.units.length();
                     Cell { across, ..whole(raw, shape, raw.nodes.clone(), section) }
                 }
-                Kind::Flat(flat) => {
-                    let deck = &mut self.deck;
-                    let thickness = share * section.thickness;
-                    let nodes = thicken(deck, flat, &raw.nodes, thickness, &mut sides);
-                    whole(raw, flat.shape, nodes, section)
-                }
             };
             self.raw[i].cell = Some(self.deck.cells.len() as u32);
             self.deck.cells.push(cell);
@@ -315,12 +282,12 @@ impl Reader {
         Ok(())
     }
 
-    /// Every spring and coupling is described.
+    /// Every spring is described.
     pub(super) fn unlinked(&self) -> Result<(), Fault> {
         let open = |(i, raw): (usize, &Raw)| {
             let open = matches!(raw.kind, Kind::Link(_)) && !self.sprung.contains(&(i as u32));
             open.then(|| {
-                let why = "has no *SPRING, *DASHPOT, *GAP or *DISTRIBUTING COUPLING";
+                let why = "has no *SPRING";
                 Fault::at(raw.line, format!("element {} {why}", raw.label))
             })
         };
@@ -344,7 +311,6 @@ fn whole(raw: &Raw, shape: Shape, nodes: Vec<u32>, section: &Section) -> Cell {
         orientation: section.orientation,
         across: 0.0,
         points: Vec::new(),
-        layers: Vec::new(),
     }
 }
 

@@ -1,5 +1,4 @@
-//! Decks of any solid elements: what engineers exchange beside members of concrete. Linear elastic,
-//! but where displacements are large and metals flow.
+//! Decks of any solid elements: what engineers exchange beside members of concrete. Linear elastic.
 //!
 //! Decks of bricks, shells and bars whose concrete may crack go through [`crate::read`] and
 //! [`crate::deck`]. What those do not know is read here, computed at the end of each step, and
@@ -8,11 +7,11 @@
 //!
 //! | subject | what |
 //! |---|---|
-//! | elements | C3D4, C3D6, C3D8, C3D8I, C3D8R (with CalculiX' stiffness against hourglasses: they bend far too much with one or two across), C3D10, C3D15, C3D20, C3D20R; CPS, CPE and CAX of 3, 4, 6 and 8 nodes and 8R, as layers of solids; S3, S4, S6, S8, S8R and B31, B32, B32R (`*NORMAL`; sections RECT, CIRC, PIPE, BOX, with offsets); T3D2, SPRINGA (also NONLINEAR), SPRING1, SPRING2, DASHPOTA, GAPUNI |
-//! | materials | `*ELASTIC` (ISO, ORTHO, ANISO, ENGINEERING CONSTANTS), `*EXPANSION`, `*CONDUCTIVITY` (ISO, ORTHO), `*DENSITY`, `*SPECIFIC HEAT`, all by temperature; `*PLASTIC` (isotropic, kinematic and both, with NLGEOM); with NLGEOM `*HYPERELASTIC` (NEO HOOKE, MOONEY-RIVLIN, OGDEN), `*HYPERFOAM`, `*DEFORMATION PLASTICITY`; `*ORIENTATION` |
-//! | constraints | `*BOUNDARY`, `*EQUATION` (also REMOVE), `*TRANSFORM`, `*TIE` (also CYCLIC SYMMETRY, with `*CYCLIC SYMMETRY MODEL`), `*RIGID BODY`, `*MPC` (MEANROT, PLANE, STRAIGHT), `*DISTRIBUTING COUPLING`, `*PRE-TENSION SECTION` |
-//! | loads | `*CLOAD`, `*DLOAD` (P, GRAV, CENTRIF), `*DSLOAD` (P), `*TEMPERATURE`, `*INITIAL CONDITIONS` (TEMPERATURE, STRESS, PLASTIC STRAIN), `*AMPLITUDE`; `*CFLUX`, `*DFLUX`, `*FILM`, `*RADIATE` |
-//! | steps | `*STATIC`, `*FREQUENCY` (of sectors `*SELECT CYCLIC SYMMETRY MODES`), `*BUCKLE`, `*HEAT TRANSFER` (steady, in time, FREQUENCY), `*COUPLED` and `*UNCOUPLED TEMPERATURE-DISPLACEMENT` (steady), `*STATIC` with `NLGEOM` (not of C3D8R, T3D2); `*DYNAMIC` with the same (implicit; `*DAMPING`), `*MODAL DYNAMIC` and harmonic `*STEADY STATE DYNAMICS` by the modes of the `*FREQUENCY` before, with `*MODAL DAMPING`; `OP=MOD` and `OP=NEW` |
+//! | elements | C3D4, C3D6, C3D8, C3D8I, C3D8R (with CalculiX' stiffness against hourglasses: they bend far too much with one or two across), C3D10, C3D15, C3D20, C3D20R; S3, S4, S6, S8, S8R and B31, B32, B32R (`*NORMAL`; sections RECT, CIRC, PIPE, BOX, with offsets); T3D2, SPRINGA, SPRING1, SPRING2 |
+//! | materials | `*ELASTIC` (ISO, ORTHO, ANISO, ENGINEERING CONSTANTS), `*EXPANSION`, `*CONDUCTIVITY` (ISO, ORTHO), `*DENSITY`, `*SPECIFIC HEAT`, all by temperature; `*ORIENTATION` |
+//! | constraints | `*BOUNDARY`, `*EQUATION` (also REMOVE), `*TRANSFORM`, `*TIE` |
+//! | loads | `*CLOAD`, `*DLOAD` (P, GRAV), `*DSLOAD` (P), `*TEMPERATURE`, `*INITIAL CONDITIONS` (TEMPERATURE, STRESS), `*AMPLITUDE`; `*CFLUX`, `*DFLUX`, `*FILM`, `*RADIATE` |
+//! | steps | `*STATIC`, `*FREQUENCY`, `*BUCKLE`, `*HEAT TRANSFER` (steady, in time; a `*STATIC` step after it takes its temperatures); `OP=MOD` and `OP=NEW` |
 //!
 //! Everything else is refused in one line that names all of it.
 //!
@@ -20,31 +19,24 @@
 //! groups are made of, what holds them and what acts on them ([`Groups`]).
 
 mod constraint;
-mod curve;
-mod cyclic;
-mod dynamic;
 mod element;
-mod finite;
-mod flat;
 mod free;
 mod gmsh;
 mod groups;
 mod heat;
-mod large;
 mod law;
 mod link;
 mod matter;
 mod mesh;
 mod model;
 mod modes;
-mod plastic;
 mod read;
 mod shape;
 mod solve;
 mod steps;
 mod thin;
 mod tie;
-mod vibrate;
+mod turn;
 mod warm;
 
 pub use gmsh::parse_mesh;

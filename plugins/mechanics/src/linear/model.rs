@@ -1,22 +1,15 @@
 //! What a deck says, in SI and by positions.
 
-use std::{
-    collections::{BTreeMap, BTreeSet, HashMap},
-    f64::consts::PI,
-};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use glam::DVec3;
 
 use super::{
     constraint::Equation,
-    curve::Curved,
-    finite::Finite,
     law::{Elastic, Expansion, Table},
-    plastic::Hardening,
     shape::{Point, Shape},
 };
 use crate::{
-    model::interpolate,
     tensor::{self, Frame, Voigt},
     write::Grid,
 };
@@ -26,21 +19,17 @@ use crate::{
 pub struct Deck {
     /// m.
     pub(super) nodes: Vec<DVec3>,
-    /// Numbers of the nodes that the deck has; nodes that thicken flat elements follow.
+    /// Numbers of the nodes that the deck has; nodes around those of beams and shells follow.
     pub(super) labels: Vec<u32>,
     pub(super) cells: Vec<Cell>,
     pub(super) materials: Vec<Material>,
     pub(super) orientations: Vec<Orientation>,
     pub(super) springs: Vec<Spring>,
-    /// What holds in every step: equations, ties, thickened elements.
+    /// What holds in every step: equations, ties, beams and shells.
     pub(super) equations: Vec<Equation>,
     /// Steps from which on equations do not hold any more.
     pub(super) until: HashMap<usize, u32>,
-    /// Those of the equations that are others where displacements are large.
-    pub(super) curved: Vec<Curved>,
-    /// Those of the equations that bind two sides of a sector.
-    pub(super) phases: HashMap<usize, Phase>,
-    /// Nodes that thicken flat elements, and the node that each has its temperature from.
+    /// Nodes around those of beams and shells, and the node that each has its temperature from.
     pub(super) twins: HashMap<u32, u32>,
     /// Nodes whose displacement is given as the mean of others.
     pub(super) means: HashMap<u32, Vec<(u32, f64)>>,
@@ -73,90 +62,21 @@ pub(super) struct Cell {
     pub(super) across: f64,
     /// Points of integration, where they are not those of its shape.
     pub(super) points: Vec<Point>,
-    /// Material and axes at every point, where they differ.
-    pub(super) layers: Vec<(u32, Option<u32>)>,
-}
-
-/// How an equation binds two sides of a sector.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Phase {
-    /// How many of its first terms are of the side that is ahead.
-    pub(super) ahead: usize,
-    /// By how much, where there is one nodal diameter.
-    pub(super) angle: f64,
 }
 
 /// A linear spring: its force is k times a sum of displacements, and acts on each by its factor.
 #[derive(Debug, Clone)]
 pub(super) struct Spring {
     pub(super) terms: Vec<(u32, f64)>,
-    /// The two nodes that it lies between, if it turns with the line between them where
-    /// displacements are large.
-    pub(super) ends: Option<[u32; 2]>,
     /// N/m.
     pub(super) stiffness: f64,
-    /// Elongation, m, and force, N, where these are not in proportion.
-    pub(super) law: Vec<(f64, f64)>,
-    /// Of a dashpot: frequency, Hz, and N·s/m.
-    pub(super) drag: Vec<(f64, f64)>,
-    pub(super) gap: Option<Gap>,
-}
-
-/// What bears once it has closed: F = K d (½ + atan(d/ε)/π) where it has by d, ε = π c/K. Far open,
-/// it is pulled by c.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Gap {
-    /// m.
-    pub(super) clearance: f64,
-    /// K, N/m.
-    pub(super) stiffness: f64,
-    /// c, N.
-    pub(super) pull: f64,
-}
-
-impl Gap {
-    /// Tension when it is so much wider, and by how much that grows.
-    fn force(&self, wider: f64) -> [f64; 2] {
-        let closed = -wider - self.clearance;
-        let at = closed * self.stiffness / (PI * self.pull);
-        // ½ + atan(d/ε)/π to all digits where it is far open, too.
-        let share = 1f64.atan2(-at) / PI;
-        let slope = share + at / (PI * (1.0 + at * at));
-        [-self.stiffness * closed * share, self.stiffness * slope]
-    }
 }
 
 impl Spring {
-    /// Its force when it is so much longer, and by how much that grows.
-    pub(super) fn force(&self, longer: f64) -> [f64; 2] {
-        if let Some(gap) = self.gap {
-            return gap.force(longer);
-        }
-        let i = self.law.partition_point(|p| p.0 <= longer);
-        match (i.checked_sub(1).and_then(|i| self.law.get(i)), self.law.get(i)) {
-            (Some(&(x, f)), Some(&(y, g))) => {
-                let slope = (g - f) / (y - x);
-                [f + slope * (longer - x), slope]
-            }
-            (Some(&(_, f)), None) | (None, Some(&(_, f))) => [f, 0.0],
-            (None, None) => [self.stiffness * longer, self.stiffness],
-        }
-    }
-
-    /// Force by speed at a frequency, Hz; none of a spring.
-    pub(super) fn drag(&self, frequency: f64) -> f64 {
-        interpolate(&self.drag, frequency).unwrap_or(0.0)
-    }
-
     /// Adds its stiffness, row by row.
     pub(super) fn resist(&self, k: &mut [f64]) {
-        self.outer(self.stiffness, k);
-    }
-
-    /// Adds a matrix of its terms, row by row.
-    pub(super) fn outer(&self, factor: f64, k: &mut [f64]) {
         for (row, a) in k.chunks_mut(self.terms.len()).zip(&self.terms) {
-            let force = factor * a.1;
+            let force = self.stiffness * a.1;
             row.iter_mut().zip(&self.terms).for_each(|(k, b)| *k += force * b.1);
         }
     }
@@ -168,17 +88,12 @@ pub(super) struct Material {
     pub(super) name: String,
     pub(super) elastic: Option<Elastic>,
     pub(super) expansion: Option<Expansion>,
-    pub(super) plastic: Option<Hardening>,
-    /// Its law where strains are not small, if it has no other.
-    pub(super) finite: Option<Finite>,
     /// kg/m³.
     pub(super) density: Option<Table<1>>,
     /// Along its own axes, W/(m·K).
     pub(super) conductivity: Option<Table<3>>,
     /// J/(kg·K).
     pub(super) specific_heat: Option<Table<1>>,
-    /// Rayleigh's: so many times the mass, 1/s, and so many times the stiffness, s.
-    pub(super) damping: [f64; 2],
 }
 
 /// The axes of a material.
@@ -205,37 +120,6 @@ impl Orientation {
     }
 }
 
-/// Force on a volume.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Pull {
-    /// m/s².
-    Weight(DVec3),
-    /// About an axis: a point of it, its direction, the square of the angular velocity.
-    Spin { origin: DVec3, axis: DVec3, squared: f64 },
-}
-
-impl Pull {
-    /// So many times as much.
-    pub(super) fn times(self, factor: f64) -> Self {
-        match self {
-            Self::Weight(acceleration) => Self::Weight(factor * acceleration),
-            Self::Spin { origin, axis, squared } => {
-                Self::Spin { origin, axis, squared: factor * squared }
-            }
-        }
-    }
-
-    /// m/s².
-    pub(super) fn at(self, place: DVec3) -> DVec3 {
-        match self {
-            Self::Weight(acceleration) => acceleration,
-            Self::Spin { origin, axis, squared } => {
-                squared * (place - origin).reject_from_normalized(axis)
-            }
-        }
-    }
-}
-
 /// What a step computes.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) enum Procedure {
@@ -251,46 +135,14 @@ pub(super) enum Procedure {
         /// s.
         duration: f64,
     },
-    /// The smallest eigenvalues, of motion or of heat.
+    /// The smallest eigenvalues of motion.
     Modes {
         count: usize,
         /// With the stresses of the step before.
         stressed: bool,
-        heat: bool,
     },
     /// The smallest factors of the loads at which the structure buckles.
     Buckling { count: usize },
-    /// Motion over time by the modes of the last step of them: in increments of so many seconds, or
-    /// from corner to corner of what acts.
-    Motion { increment: Option<f64>, duration: f64 },
-    /// Motion over time by the equations themselves, in increments of so many seconds or shorter
-    /// ones, with Hilber's, Hughes' and Taylor's α.
-    Dynamic { increment: f64, fixed: bool, duration: f64, alpha: f64 },
-    /// What stays of vibrations at frequencies between these, Hz: so many of them between two
-    /// modes, the nearer to these the larger the bias.
-    Harmonic { range: [f64; 2], points: u32, bias: f64 },
-}
-
-/// What takes energy from a mode.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub(super) enum Damping {
-    #[default]
-    None,
-    /// Rayleigh's: so many times the mass, 1/s, and so many times the stiffness, s.
-    Rayleigh { mass: f64, stiffness: f64 },
-    /// Over critical damping, by mode.
-    Shares(Vec<f64>),
-}
-
-/// What follows one course over time or frequency.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Course {
-    /// Time, s, or frequency, Hz, and factor; none: the factor is one.
-    pub(super) points: Vec<(f64, f64)>,
-    /// Forces where the factor is one, on what does not move where it is supported.
-    pub(super) loads: Step,
-    /// Supports where the factor is one, and no forces.
-    pub(super) base: Step,
 }
 
 /// A way of heating.
@@ -318,51 +170,21 @@ pub(super) struct Step {
     /// From 1.
     pub(super) number: u32,
     pub(super) procedure: Procedure,
-    /// Fewest and most nodal diameters of vibrations of a sector.
-    pub(super) diameters: Option<[u32; 2]>,
-    /// Whether equilibrium is where everything has gone to.
-    pub(super) large: bool,
     /// Components (in the node's own axes) and values, m.
     pub(super) held: BTreeMap<(u32, u8), f64>,
     /// Components that stay where the step before has left them.
     pub(super) kept: BTreeSet<(u32, u8)>,
     /// N.
     pub(super) forces: BTreeMap<(u32, u8), f64>,
-    /// Forces a quarter of a period before them, N.
-    pub(super) early: BTreeMap<(u32, u8), f64>,
-    /// What acts over time or frequency, beside all that.
-    pub(super) courses: Vec<Course>,
-    pub(super) damping: Damping,
     /// Pa, by element and face.
     pub(super) pressures: BTreeMap<(u32, u8), f64>,
-    pub(super) pulls: Vec<(u32, Pull)>,
+    /// Accelerations of elements by which they weigh, m/s².
+    pub(super) pulls: Vec<(u32, DVec3)>,
     /// Of every node; empty: as at the beginning, or as the last heat step has left it.
     pub(super) warm: Vec<f64>,
     /// Temperatures that a heat step holds.
     pub(super) temperatures: BTreeMap<u32, f64>,
     pub(super) heating: BTreeMap<Heated, [f64; 2]>,
-    /// Elements that are made of another material than their own.
-    pub(super) materials: BTreeMap<u32, u32>,
-}
-
-impl Step {
-    /// The step at a time of it: everything times what its course is then.
-    pub(super) fn at(&self, time: f64) -> Self {
-        let mut now = Self { courses: Vec::new(), ..self.clone() };
-        for course in &self.courses {
-            let factor = interpolate(&course.points, time).unwrap_or(1.0);
-            let add = |to: &mut BTreeMap<(u32, u8), f64>, from: &BTreeMap<(u32, u8), f64>| {
-                for (&key, value) in from {
-                    *to.entry(key).or_default() += factor * value;
-                }
-            };
-            add(&mut now.held, &course.base.held);
-            add(&mut now.forces, &course.loads.forces);
-            add(&mut now.pressures, &course.loads.pressures);
-            now.pulls.extend(course.loads.pulls.iter().map(|&(e, pull)| (e, pull.times(factor))));
-        }
-        now
-    }
 }
 
 impl Deck {
@@ -377,15 +199,15 @@ impl Deck {
         self.cells.iter().map(|c| c.label)
     }
 
-    /// Its elements as a picture, whose regions are their materials; none where planes, beams or
-    /// shells have become solids with nodes that the deck does not name.
+    /// Its elements as a picture, whose regions are their materials; none where beams or shells
+    /// have become solids with nodes that the deck does not name.
     #[must_use]
     pub fn grid(&self) -> Option<Grid<'_>> {
         let cells = self.cells.iter().map(|c| (c.shape.vtk(), c.nodes.as_slice(), c.material));
         (self.nodes.len() == self.labels.len()).then(|| Grid::of(&self.nodes, cells))
     }
 
-    /// Gives nodes that thicken flat elements the temperature of their own.
+    /// Gives nodes around those of beams and shells the temperature of these.
     pub(super) fn spread(&self, temperatures: &mut [f64]) {
         for (&twin, &node) in &self.twins {
             temperatures[twin as usize] = temperatures[node as usize];

@@ -1,5 +1,4 @@
-//! The smallest eigenvalues λ of K φ = λ G φ: squares of frequencies (G the mass), rates of decay
-//! (G the capacity of heat), factors of buckling (G what stresses take from the stiffness).
+//! The smallest eigenvalues λ of K φ = λ G φ: squares of frequencies (G the mass), factors of buckling (G what stresses take from the stiffness).
 //!
 //! K⁻¹ G is symmetric in the scalar product of K. Its largest eigenvalues 1/λ are taken from a
 //! Krylov space of blocks (Golub and Underwood 1977), which finds as many equal ones as a block
@@ -42,21 +41,14 @@ impl From<SolveError> for Failed {
     }
 }
 
-/// An eigenvalue and its vector, of which G makes one: φᵀ G φ = 1.
-#[derive(Debug, Clone)]
-pub(super) struct Mode {
-    pub(super) value: f64,
-    pub(super) shape: Vec<f64>,
-}
-
-/// The modes of the smallest positive eigenvalues, ascending; fewer where there are not as many.
+/// The smallest positive eigenvalues, ascending; fewer where there are not as many.
 /// Where K is singular, those of K + s G, less s.
 pub(super) fn smallest(
     mut k: BlockMatrix<1>,
     g: &BlockMatrix<1>,
     count: usize,
     job: &Job,
-) -> Result<Vec<Mode>, Failed> {
+) -> Result<Vec<f64>, Failed> {
     match Krylov::new(&k, g, job) {
         Ok(krylov) => krylov.smallest(count, job),
         Err(
@@ -71,9 +63,9 @@ pub(super) fn smallest(
             let shift = SHIFT * k.trace() / g.trace();
             k.add(shift, g);
             let mut found = Krylov::new(&k, g, job)?.smallest(count, job)?;
-            found.iter_mut().for_each(|mode| mode.value -= shift);
+            found.iter_mut().for_each(|value| *value -= shift);
             // What moves freely differs from nothing by rounding alone.
-            let is_unstable = found.iter().any(|mode| mode.value < -ROUNDING * shift);
+            let is_unstable = found.iter().any(|value| *value < -ROUNDING * shift);
             if is_unstable { Err(Failed::Indefinite) } else { Ok(found) }
         }
         Err(other) => Err(other),
@@ -103,7 +95,7 @@ impl<'a> Krylov<'a> {
         Ok(Self { k, g, solver, basis: Vec::new(), stiff: Vec::new(), pushed: Vec::new() })
     }
 
-    fn smallest(mut self, count: usize, job: &Job) -> Result<Vec<Mode>, Failed> {
+    fn smallest(mut self, count: usize, job: &Job) -> Result<Vec<f64>, Failed> {
         let unknowns = self.k.unknowns();
         let mut seeds = 0;
         let mut last: Vec<f64> = Vec::new();
@@ -139,11 +131,11 @@ impl<'a> Krylov<'a> {
                 && found[..=count].iter().zip(&last).all(near)
                 && self.is_whole(&found, count, job)
             {
-                return Ok(self.modes(count));
+                return Ok(first(found, count));
             }
             last = found;
         }
-        Ok(self.modes(count))
+        Ok(first(self.ritz(), count))
     }
 
     fn solved(&mut self, rhs: &[f64], job: &Job) -> Result<Vec<f64>, Failed> {
@@ -186,22 +178,7 @@ impl<'a> Krylov<'a> {
     /// λ of the basis, those above 0, ascending (Rayleigh and Ritz).
     fn ritz(&self) -> Vec<f64> {
         let all = self.projected().symmetric_eigenvalues();
-        above_nothing(all.as_slice()).into_iter().map(|(value, _)| value).collect()
-    }
-
-    /// The first of them with their vectors.
-    fn modes(&self, count: usize) -> Vec<Mode> {
-        let eigen = self.projected().symmetric_eigen();
-        let mode = |(value, at): (f64, usize)| {
-            let mut shape = vec![0.0; self.k.unknowns()];
-            // Of unit length in the scalar product of K, so that G makes 1/λ of it.
-            for (share, b) in eigen.eigenvectors.column(at).iter().zip(&self.basis) {
-                let share = share * value.sqrt();
-                shape.iter_mut().zip(b).for_each(|(s, b)| *s += share * b);
-            }
-            Mode { value, shape }
-        };
-        above_nothing(eigen.eigenvalues.as_slice()).into_iter().take(count).map(mode).collect()
+        above_nothing(all.as_slice())
     }
 
     /// Whether K − σ G has as many negative eigenvalues as were found below σ.
@@ -221,13 +198,19 @@ impl<'a> Krylov<'a> {
     }
 }
 
-/// λ of 1/λ, those above 0, ascending, each with its place.
-fn above_nothing(inverse: &[f64]) -> Vec<(f64, usize)> {
+/// λ of 1/λ, those above 0, ascending.
+fn above_nothing(inverse: &[f64]) -> Vec<f64> {
     let largest = inverse.iter().fold(0.0, |a: f64, b| a.max(*b));
-    let places = inverse.iter().enumerate().filter(|(_, m)| **m > 1e-12 * largest);
-    let mut found: Vec<(f64, usize)> = places.map(|(at, m)| (1.0 / m, at)).collect();
-    found.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+    let above = inverse.iter().filter(|m| **m > 1e-12 * largest);
+    let mut found: Vec<f64> = above.map(|m| 1.0 / m).collect();
+    found.sort_unstable_by(f64::total_cmp);
     found
+}
+
+/// So many of them.
+fn first(mut values: Vec<f64>, count: usize) -> Vec<f64> {
+    values.truncate(count);
+    values
 }
 
 /// A vector without symmetries: Weyl's sequence of the golden ratio.
@@ -237,12 +220,12 @@ fn start(unknowns: usize, number: usize) -> Vec<f64> {
     (1..=unknowns).map(value).collect()
 }
 
-pub(super) fn times(matrix: &BlockMatrix<1>, v: &[f64]) -> Vec<f64> {
+fn times(matrix: &BlockMatrix<1>, v: &[f64]) -> Vec<f64> {
     let mut result = vec![0.0; v.len()];
     matrix.multiply(v, &mut result);
     result
 }
 
-pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
+fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }

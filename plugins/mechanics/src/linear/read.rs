@@ -8,8 +8,6 @@ use std::{
 use glam::DVec3;
 
 use super::{
-    cyclic::Sides,
-    flat::Flat,
     link::Link,
     model::Deck,
     shape::Shape,
@@ -27,14 +25,10 @@ use crate::read::{
 
 /// Cards that are read, without their spaces.
 const KNOWN: &str = "NODE ELEMENT NSET ELSET SURFACE MATERIAL ELASTIC DENSITY EXPANSION \
-    CONDUCTIVITY SPECIFICHEAT DAMPING PLASTIC CYCLICHARDENING HYPERELASTIC HYPERFOAM \
-    DEFORMATIONPLASTICITY SOLIDSECTION SHELLSECTION BEAMSECTION BEAMGENERALSECTION NODALTHICKNESS \
-    NORMAL MEMBRANE ORIENTATION AMPLITUDE TRANSFORM EQUATION TIE CYCLICSYMMETRYMODEL \
-    SELECTCYCLICSYMMETRYMODES SPRING DASHPOT GAP MPC RIGIDBODY DISTRIBUTINGCOUPLING \
-    PRE-TENSIONSECTION PHYSICALCONSTANTS INITIALCONDITIONS BOUNDARY STEP STATIC DYNAMIC FREQUENCY \
-    BUCKLE HEATTRANSFER MODALDYNAMIC COUPLEDTEMPERATURE-DISPLACEMENT \
-    UNCOUPLEDTEMPERATURE-DISPLACEMENT STEADYSTATEDYNAMICS MODALDAMPING CLOAD DLOAD DSLOAD \
-    TEMPERATURE CFLUX DFLUX FILM RADIATE CHANGESOLIDSECTION ENDSTEP";
+    CONDUCTIVITY SPECIFICHEAT SOLIDSECTION SHELLSECTION BEAMSECTION BEAMGENERALSECTION \
+    NORMAL ORIENTATION AMPLITUDE TRANSFORM EQUATION TIE SPRING \
+    PHYSICALCONSTANTS INITIALCONDITIONS BOUNDARY STEP STATIC FREQUENCY BUCKLE HEATTRANSFER CLOAD \
+    DLOAD DSLOAD TEMPERATURE CFLUX DFLUX FILM RADIATE ENDSTEP";
 /// Cards that only concern what is printed, beside those of every deck.
 const OUTPUT: [&str; 2] = ["FACEPRINT", "TIMEPOINTS"];
 /// What only says how CalculiX iterates.
@@ -54,7 +48,6 @@ pub fn concerns(bytes: &[u8]) -> bool {
         !abaqus::knows(card)
             || card.is("PLASTIC")
             || card.get("ORIENTATION").is_some()
-            || (card.is("STEP") && card.word("NLGEOM").is_some_and(|word| word != "NO"))
             || (card.is("ELEMENT")
                 && !abaqus::knows_element(&card.word("TYPE").unwrap_or_default()))
     })
@@ -84,10 +77,6 @@ fn deck(bytes: &[u8], units: Units) -> Result<Deck, Fault> {
         });
         reader.fail()?;
     }
-    for card in &cards {
-        let read = reader.cut(card);
-        reader.keep(read);
-    }
     let made = reader.make();
     reader.keep(made);
     reader.fail()?;
@@ -106,14 +95,12 @@ fn deck(bytes: &[u8], units: Units) -> Result<Deck, Fault> {
     let ended = state.ended();
     reader.keep(ended);
     // Ties last: what is bound otherwise stays as it is.
-    for pass in [Reader::equation, Reader::tie, Reader::cyclic] {
+    for pass in [Reader::equation, Reader::tie] {
         cards.iter().for_each(|card| {
             let read = pass(&mut reader, card);
             reader.keep(read);
         });
     }
-    let sectored = reader.sectored();
-    reader.keep(sectored);
     reader.fail()?;
     Ok(reader.finished())
 }
@@ -122,7 +109,6 @@ fn deck(bytes: &[u8], units: Units) -> Result<Deck, Fault> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Kind {
     Solid(Shape),
-    Flat(Flat),
     Link(Link),
     Thin(Thin),
 }
@@ -139,31 +125,12 @@ pub(super) struct Raw {
     pub(super) line: u32,
 }
 
-impl Raw {
-    /// Nodes of a face of a solid, or of a side of a plane.
-    pub(super) fn side(&self, face: u8) -> Vec<u32> {
-        let face = usize::from(face);
-        match self.kind {
-            Kind::Solid(shape) => {
-                shape.faces().nth(face).into_iter().flatten().map(|&i| self.nodes[i]).collect()
-            }
-            Kind::Flat(flat) => {
-                let (first, n) = (face.saturating_sub(2), flat.corners);
-                let mut side = vec![self.nodes[first], self.nodes[(first + 1) % n]];
-                side.extend(self.nodes.get(n + first));
-                side
-            }
-            Kind::Link(_) | Kind::Thin(_) => Vec::new(),
-        }
-    }
-}
-
 /// What an element is made of.
 #[derive(Debug, Clone)]
 pub(super) struct Section {
     pub(super) material: u32,
     pub(super) orientation: Option<u32>,
-    /// Of planes and shells, m.
+    /// Of shells, m; of bars, the area of their section.
     pub(super) thickness: f64,
     pub(super) profile: Profile,
 }
@@ -188,7 +155,7 @@ pub(super) struct Reader {
     pub(super) materials: HashMap<String, u32>,
     pub(super) orientations: HashMap<String, u32>,
     pub(super) amplitudes: HashMap<String, crate::read::Amplitude>,
-    /// Springs and couplings that are described.
+    /// Springs that are described.
     pub(super) sprung: BTreeSet<u32>,
     /// Nodes whose first three components are the angles of another.
     pub(super) turning: HashMap<u32, u32>,
@@ -199,8 +166,6 @@ pub(super) struct Reader {
     /// W/(m²·K⁴).
     pub(super) boltzmann: Option<f64>,
     pub(super) tied: bool,
-    /// Ties between sides of sectors.
-    pub(super) sides: Vec<Sides>,
     /// Places of equations by the component that comes first in them.
     pub(super) equations: BTreeMap<(u32, u8), usize>,
     /// Steps that end equations, all of them or those that a component comes first in.
@@ -229,7 +194,6 @@ impl Reader {
             normals: HashMap::new(),
             boltzmann: None,
             tied: false,
-            sides: Vec::new(),
             equations: BTreeMap::new(),
             ended: Vec::new(),
             in_material: false,
@@ -296,7 +260,8 @@ impl Reader {
             self.faults.push(card.fault(what));
         }
         if let Some(last) = self.faults.last_mut() {
-            last.reason += "; static loads, motion, vibrations, buckling and heat of elastic structures and metals are";
+            last.reason +=
+                "; static loads, free vibrations, buckling and heat of elastic structures are";
         }
     }
 

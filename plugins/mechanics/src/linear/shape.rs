@@ -238,11 +238,6 @@ impl Shape {
         }
     }
 
-    /// Points for masses that must not be singular, also where it is distorted.
-    pub(super) fn finest_points(self) -> Vec<Point> {
-        if matches!(self.nodes(), 8 | 20) { cube(&GAUSS_3) } else { self.fine_points() }
-    }
-
     /// Nodes of each of its faces, counterclockwise from outside, corners first.
     pub(super) fn faces(self) -> impl ExactSizeIterator<Item = &'static [usize]> {
         let (all, quadratic): (&'static [&'static [usize]], bool) = match self {

@@ -7,15 +7,11 @@ use intrados_stage::{Cancelled, Job};
 
 use super::{
     constraint::{Bound, Equation, Sum},
-    dynamic,
     element::{Element, Folded, Warmth},
     free::Free,
-    heat, large,
-    model::{Deck, Procedure, Pull, Spring, Step},
-    modes::{self, Mode},
-    plastic::Flow,
-    shape::Shape,
-    vibrate,
+    heat,
+    model::{Deck, Procedure, Step},
+    modes,
 };
 use crate::{
     sparse::{BlockMatrix, Constraints, Method, SolveError, solve},
@@ -33,8 +29,7 @@ pub struct Solved {
     pub stresses: Vec<Vec<Voigt>>,
     /// Of the nodes that the deck names, where the step is one of heat.
     pub temperatures: Vec<f64>,
-    /// The smallest, ascending: squares of angular frequencies, 1/s²; rates at which temperatures
-    /// decay, 1/s; factors at which loads buckle.
+    /// The smallest, ascending: squares of angular frequencies, 1/s²; factors at which loads buckle.
     pub eigenvalues: Vec<f64>,
     /// Unknowns that were solved for.
     pub unknowns: usize,
@@ -48,7 +43,7 @@ pub enum LinearError {
     Contradiction {
         /// Name of the step.
         step: String,
-        /// Line of the deck; 0: of a tie or a flat element.
+        /// Line of the deck; 0: of a beam or a shell.
         line: u32,
     },
     /// An element that is flat or turned inside out.
@@ -63,9 +58,7 @@ pub enum LinearError {
         node: u32,
     },
     /// Weight of what has none.
-    #[error(
-        "{step}: weight or spin acts on element {element}, whose material {material} has no *DENSITY"
-    )]
+    #[error("{step}: weight acts on element {element}, whose material {material} has no *DENSITY")]
     Weightless {
         /// Name of the step.
         step: String,
@@ -97,20 +90,6 @@ pub enum LinearError {
     Unstable {
         /// Name of the step.
         step: String,
-    },
-    /// Motion by modes of what was held otherwise.
-    #[error("{step}: supports and equations are not those of the step of *FREQUENCY before it")]
-    OtherModes {
-        /// Name of the step.
-        step: String,
-    },
-    /// Vibrations that grow without end.
-    #[error("{step}: without *MODAL DAMPING there is no end to vibrations at {frequency} Hz")]
-    Resonance {
-        /// Name of the step.
-        step: String,
-        /// Hz.
-        frequency: f64,
     },
     /// Temperatures or modes that do not settle.
     #[error("{step}: {what} do not converge")]
@@ -144,16 +123,9 @@ const TOLERANCE: f64 = 1e-6;
 pub(super) struct Past {
     /// Of every unknown; empty before the first step.
     pub(super) displacements: Vec<f64>,
-    /// The same by the second; empty after a step that is none of motion.
-    pub(super) speeds: Vec<f64>,
     pub(super) stresses: Vec<Vec<Voigt>>,
-    /// What has flowed at every point; empty: nothing.
-    pub(super) flow: Vec<Vec<Flow>>,
-    /// Whether they are of equilibrium where everything has gone to.
-    pub(super) large: bool,
     /// Of every node.
     pub(super) temperatures: Vec<f64>,
-    pub(super) modes: Option<vibrate::Modes>,
 }
 
 impl Past {
@@ -164,8 +136,7 @@ impl Past {
 }
 
 impl Deck {
-    /// Computes every step: what it ends in; where it asks for vibrations, the real and the imaginary
-    /// part at every frequency.
+    /// Computes every step: what it ends in.
     ///
     /// # Errors
     /// [`LinearError`].
@@ -175,74 +146,42 @@ impl Deck {
         let mut solved = Vec::new();
         for (i, step) in self.steps.iter().enumerate() {
             job.step(i, self.steps.len())?;
-            if !matches!(step.procedure, Procedure::Dynamic { .. }) {
-                past.speeds.clear();
-            }
             let part = job.part(i as f64 / share, (i + 1) as f64 / share);
-            match step.procedure {
-                Procedure::Motion { .. } | Procedure::Harmonic { .. } => {
-                    solved.extend(vibrate::solve(self, step, &mut past, &part)?);
-                }
-                Procedure::Modes { count, stressed, .. } if step.diameters.is_some() => {
-                    past.modes = None;
-                    let [least, most] = step.diameters.unwrap_or_default();
-                    for number in least..=most {
-                        let (system, all) =
-                            self.vibrating(step, count, stressed, Some(number), &past, &part)?;
-                        let name = format!("{}, {number} nodal diameters", step.name);
-                        solved.push(Solved { name, ..system.eigenvalues(&all) });
-                    }
-                }
-                _ => solved.push(self.step(step, &mut past, &part)?),
-            }
+            solved.push(self.step(step, &mut past, &part)?);
         }
         Ok(solved)
     }
 
     fn step(&self, step: &Step, past: &mut Past, job: &Job) -> Result<Solved, LinearError> {
         match step.procedure {
-            Procedure::Modes { count, heat: true, .. } => heat::modes(self, step, count, job),
-            Procedure::Modes { count, stressed, .. } => {
-                let (system, all) = self.vibrating(step, count, stressed, None, past, job)?;
-                let solved = system.eigenvalues(&all);
-                let order = system.free.order().to_vec();
-                past.modes = Some(vibrate::Modes { order, all, state: Vec::new() });
-                Ok(solved)
+            Procedure::Modes { count, stressed } => {
+                let (system, all) = self.vibrating(step, count, stressed, past, job)?;
+                Ok(system.eigenvalues(all))
             }
             Procedure::Buckling { count } => {
                 let system = System::new(self, step, past)?;
-                Ok(system.eigenvalues(&system.buckling(count, job)?))
+                Ok(system.eigenvalues(system.buckling(count, job)?))
             }
             Procedure::Heat { steady, first, duration } => {
                 let time = (!steady).then_some([first, duration]);
                 heat::solve(self, step, time, &mut past.temperatures, job)
             }
-            Procedure::Dynamic { .. } => dynamic::solve(self, step, past, job),
-            _ if step.large => large::solve(self, step, past, job),
             _ => System::new(self, step, past)?.solve(past, job),
         }
     }
 
-    /// The first modes of motion, with the stresses of the step before or without; those of so many
-    /// nodal diameters.
+    /// The first modes of motion, with the stresses of the step before or without.
     fn vibrating<'a>(
         &'a self,
         step: &'a Step,
         count: usize,
         stressed: bool,
-        diameters: Option<u32>,
         past: &Past,
         job: &Job,
-    ) -> Result<(System<'a>, Vec<Mode>), LinearError> {
-        let (system, stiffness) = if stressed && past.large {
-            large::tangent(self, step, past, diameters, job)?
-        } else {
-            let equations = self.constraints(step, past);
-            let system = System::bound(self, step, past, &equations, diameters, false)?;
-            let stresses = if stressed { past.stresses.as_slice() } else { &[] };
-            let stiffness = system.stiff_under(stresses, job)?;
-            (system, stiffness)
-        };
+    ) -> Result<(System<'a>, Vec<f64>), LinearError> {
+        let system = System::new(self, step, past)?;
+        let stresses = if stressed { past.stresses.as_slice() } else { &[] };
+        let stiffness = system.stiff_under(stresses, job)?;
         let (mass, _) = system.mass(job)?;
         let all = system.smallest(stiffness, &mass, count, job)?;
         Ok((system, all))
@@ -280,51 +219,16 @@ pub(super) struct System<'a> {
     warm: Vec<f64>,
     /// What is solved for, by elements and after them by springs.
     pub(super) free: Free<'a>,
-    /// Whether springs turn.
-    large: bool,
 }
 
 impl<'a> System<'a> {
     pub(super) fn new(deck: &'a Deck, step: &'a Step, past: &Past) -> Result<Self, LinearError> {
         let sums = sums(deck, step, &deck.constraints(step, past))?;
-        Ok(Self::of(deck, step, past, sums, false))
-    }
-
-    /// From what binds it; with so many nodal diameters, real and imaginary parts of a sector.
-    pub(super) fn bound(
-        deck: &'a Deck,
-        step: &'a Step,
-        past: &Past,
-        equations: &[Equation],
-        diameters: Option<u32>,
-        large: bool,
-    ) -> Result<Self, LinearError> {
-        let sums = match diameters {
-            None => sums(deck, step, equations)?,
-            Some(number) => {
-                let supports = step.held.len() + step.kept.len();
-                let all = deck.waved(equations, supports, number);
-                sums_of(6 * deck.nodes.len() as u32, step, &all)?
-            }
-        };
-        Ok(Self::of(deck, step, past, sums, large))
-    }
-
-    /// From what every unknown is by the free ones, with springs that turn or not. Where there are
-    /// several copies of the deck, their unknowns follow each other.
-    pub(super) fn of(
-        deck: &'a Deck,
-        step: &'a Step,
-        past: &Past,
-        sums: Vec<Sum>,
-        large: bool,
-    ) -> Self {
         let warm = if step.warm.is_empty() { &past.temperatures } else { &step.warm };
-        let (each, own) = (deck.cells.len() + deck.springs.len(), 3 * deck.nodes.len());
-        let copies = sums.len() / own.max(1);
-        let elements = (0..copies * each).map(|e| copied(deck, e, large));
-        let free = Free::new(deck, sums, elements, |unknown| unknown % own as u32 / 3);
-        Self { deck, step, warm: warm.clone(), free, large }
+        let count = deck.cells.len() + deck.springs.len();
+        let elements = (0..count).map(|e| unknowns(deck, e));
+        let free = Free::new(deck, sums, elements, |unknown| unknown / 3);
+        Ok(Self { deck, step, warm: warm.clone(), free })
     }
 
     /// Temperatures of the nodes of an element.
@@ -338,7 +242,7 @@ impl<'a> System<'a> {
     }
 
     pub(super) fn element(&self, e: usize) -> Element<'a> {
-        Element::new(self.deck, self.step, e)
+        Element::new(self.deck, e)
     }
 
     /// Stiffness and forces of every element, and the stiffness of every spring.
@@ -357,51 +261,13 @@ impl<'a> System<'a> {
         })
     }
 
-    /// Forces of what acts on elements and nodes, without those of warmth and of stress from the
-    /// beginning.
-    pub(super) fn forces(&self, job: &Job) -> Result<Vec<f64>, LinearError> {
-        let loads = self.distributed()?;
-        let (_, mut rhs) = self.assembled(job, |e, _, f| {
-            if e < self.deck.cells.len() {
-                loads.add(e, &self.element(e), &self.warmth(e), f)
-            } else {
-                Ok(())
-            }
-        })?;
-        self.nodal(&self.step.forces, &mut rhs)?;
-        Ok(rhs)
-    }
-
-    /// How everything moves with supports that move slowly, and Tᵀ M times that.
-    pub(super) fn carried(&self, job: &Job) -> Result<(Vec<f64>, Vec<f64>), LinearError> {
-        let (stiffness, rhs) =
-            self.assembled(job, |e, k, f| match e.checked_sub(self.deck.cells.len()) {
-                None => {
-                    // Of supports alone: what warms and strains from the beginning is no part of it.
-                    let mut other = vec![0.0; f.len()];
-                    self.element(e).stiffness(&self.warmth(e), |_| tensor::ZERO, k, &mut other)
-                }
-                Some(spring) => {
-                    self.deck.springs[spring].resist(k);
-                    Ok(())
-                }
-            })?;
-        let none = Constraints::new(self.free.count());
-        let found = solve(&stiffness, &rhs, &none, Method::Direct, TOLERANCE, job);
-        let free = found.map_err(|e| self.explained(e))?.x;
-        // Of the mass, what supports push is on the other side: −Tᵀ M c.
-        let (mass, pulled) = self.mass(job)?;
-        let pushed = modes::times(&mass, &free).iter().zip(&pulled).map(|(a, b)| a - b).collect();
-        Ok((self.free.expanded(&free), pushed))
-    }
-
     fn mass(&self, job: &Job) -> Result<(BlockMatrix<1>, Vec<f64>), LinearError> {
         let cells = self.deck.cells.len();
         self.assembled(job, |e, m, _| {
             if e >= cells {
                 return Ok(());
             }
-            self.element(e).mass(Shape::fine_points, &self.warmth(e), m)
+            self.element(e).mass(&self.warmth(e), m)
         })
     }
 
@@ -411,12 +277,7 @@ impl<'a> System<'a> {
         job: &Job,
         fill: impl Fn(usize, &mut [f64], &mut [f64]) -> Result<(), Folded> + Sync,
     ) -> Result<(BlockMatrix<1>, Vec<f64>), LinearError> {
-        let each = self.deck.cells.len() + self.deck.springs.len();
-        self.free.assembled(
-            job,
-            |e| copied(self.deck, e, self.large),
-            |e, k, f| fill(e % each, k, f),
-        )
+        self.free.assembled(job, |e| unknowns(self.deck, e), fill)
     }
 
     fn solve(self, past: &mut Past, job: &Job) -> Result<Solved, LinearError> {
@@ -424,7 +285,6 @@ impl<'a> System<'a> {
         let solved = self.finished(self.step.name.clone(), &all)?;
         past.displacements = all;
         past.stresses.clone_from(&solved.stresses);
-        past.large = false;
         Ok(solved)
     }
 
@@ -494,7 +354,7 @@ impl<'a> System<'a> {
 
     /// The smallest factors at which the loads of the step make the structure unstable:
     /// (K + λ K_σ) φ = 0.
-    fn buckling(&self, count: usize, job: &Job) -> Result<Vec<Mode>, LinearError> {
+    fn buckling(&self, count: usize, job: &Job) -> Result<Vec<f64>, LinearError> {
         let stresses = self.stresses(&self.moved(job)?)?;
         let (stiffness, _) = self.stiffness(job)?;
         let mut softening = self.stress_stiffness(&stresses, job)?;
@@ -508,7 +368,7 @@ impl<'a> System<'a> {
         other: &BlockMatrix<1>,
         count: usize,
         job: &Job,
-    ) -> Result<Vec<Mode>, LinearError> {
+    ) -> Result<Vec<f64>, LinearError> {
         modes::smallest(stiffness, other, count, job).map_err(|failed| match failed {
             modes::Failed::Solve(error) => self.explained(error),
             modes::Failed::Indefinite => LinearError::Unstable { step: self.step.name.clone() },
@@ -516,9 +376,8 @@ impl<'a> System<'a> {
         })
     }
 
-    fn eigenvalues(&self, modes: &[Mode]) -> Solved {
+    fn eigenvalues(&self, eigenvalues: Vec<f64>) -> Solved {
         let (name, unknowns) = (self.step.name.clone(), self.free.count());
-        let eigenvalues = modes.iter().map(|m| m.value).collect();
         Solved { name, eigenvalues, unknowns, ..Solved::default() }
     }
 
@@ -535,21 +394,21 @@ impl<'a> System<'a> {
     }
 
     /// What acts on elements.
-    pub(super) fn distributed(&self) -> Result<Loads<'a>, LinearError> {
+    pub(super) fn distributed(&self) -> Result<Loads, LinearError> {
         let mut loads = Loads { by_cell: HashMap::new() };
         for (&(cell, face), &value) in &self.step.pressures {
             loads.by_cell.entry(cell).or_default().0.push((face, value));
         }
-        for (cell, pull) in &self.step.pulls {
-            let element = self.element(*cell as usize);
+        for &(cell, pull) in &self.step.pulls {
+            let element = self.element(cell as usize);
             if element.material().density.is_none() {
                 return Err(LinearError::Weightless {
                     step: self.step.name.clone(),
-                    element: self.deck.cells[*cell as usize].label,
+                    element: self.deck.cells[cell as usize].label,
                     material: element.material().name.clone(),
                 });
             }
-            loads.by_cell.entry(*cell).or_default().1.push(pull);
+            loads.by_cell.entry(cell).or_default().1.push(pull);
         }
         Ok(loads)
     }
@@ -599,7 +458,7 @@ impl<'a> System<'a> {
     fn stresses(&self, all: &[f64]) -> Result<Vec<Vec<Voigt>>, LinearError> {
         let stress = |e: usize| {
             let own: Vec<f64> =
-                unknowns(self.deck, e, false).into_iter().map(|u| all[u as usize]).collect();
+                unknowns(self.deck, e).into_iter().map(|u| all[u as usize]).collect();
             let found = self.element(e).stresses(&own, &self.warmth(e), self.initial(e));
             found.map_err(|Folded| LinearError::Folded(self.deck.cells[e].label))
         };
@@ -613,40 +472,26 @@ pub(super) fn sums(
     step: &Step,
     equations: &[Equation],
 ) -> Result<Vec<Sum>, LinearError> {
-    sums_of(3 * deck.nodes.len() as u32, step, equations)
-}
-
-/// So many unknowns by what is free.
-fn sums_of(count: u32, step: &Step, equations: &[Equation]) -> Result<Vec<Sum>, LinearError> {
     // Supports first: equations then bind what is left.
     let bound = Bound::new(equations)
         .map_err(|e| LinearError::Contradiction { step: step.name.clone(), line: e.line })?;
-    Ok((0..count).map(|u| bound.of(u)).collect())
+    Ok((0..3 * deck.nodes.len() as u32).map(|u| bound.of(u)).collect())
 }
 
-/// Unknowns of an element or a spring of one of several copies of the deck.
-fn copied(deck: &Deck, e: usize, large: bool) -> Vec<u32> {
-    let each = deck.cells.len() + deck.springs.len();
-    let shift = (e / each * 3 * deck.nodes.len()) as u32;
-    unknowns(deck, e % each, large).into_iter().map(|u| u + shift).collect()
-}
-
-/// Unknowns of an element or, after the elements, of a spring, which may turn.
-pub(super) fn unknowns(deck: &Deck, e: usize, large: bool) -> Vec<u32> {
-    let all = |nodes: &[u32]| nodes.iter().flat_map(|&n| (0..3).map(move |i| 3 * n + i)).collect();
-    let Some(spring) = e.checked_sub(deck.cells.len()) else { return all(&deck.cells[e].nodes) };
-    match &deck.springs[spring] {
-        Spring { ends: Some(ends), .. } if large => all(ends),
-        Spring { terms, .. } => terms.iter().map(|t| t.0).collect(),
+/// Unknowns of an element or, after the elements, of a spring.
+fn unknowns(deck: &Deck, e: usize) -> Vec<u32> {
+    match e.checked_sub(deck.cells.len()) {
+        None => deck.cells[e].nodes.iter().flat_map(|&n| (0..3).map(move |i| 3 * n + i)).collect(),
+        Some(spring) => deck.springs[spring].terms.iter().map(|t| t.0).collect(),
     }
 }
 
-/// Pressures (face, Pa) and pulls of elements.
-pub(super) struct Loads<'a> {
-    by_cell: HashMap<u32, (Vec<(u8, f64)>, Vec<&'a Pull>)>,
+/// Pressures (face, Pa) and accelerations of elements.
+pub(super) struct Loads {
+    by_cell: HashMap<u32, (Vec<(u8, f64)>, Vec<DVec3>)>,
 }
 
-impl Loads<'_> {
+impl Loads {
     pub(super) fn add(
         &self,
         e: usize,
@@ -654,32 +499,12 @@ impl Loads<'_> {
         warmth: &Warmth,
         force: &mut [f64],
     ) -> Result<(), Folded> {
-        let (pressures, pulls) = self.of(e);
+        let Some((pressures, pulls)) = self.by_cell.get(&(e as u32)) else { return Ok(()) };
         pressures.iter().for_each(|&(face, p)| element.pressure(usize::from(face), p, force));
-        self.pull(pulls, element, element, warmth, force)
-    }
-
-    /// Pressures and pulls of an element.
-    pub(super) fn of(&self, e: usize) -> (&[(u8, f64)], &[&Pull]) {
-        match self.by_cell.get(&(e as u32)) {
-            Some((pressures, pulls)) => (pressures.as_slice(), pulls.as_slice()),
-            None => (&[][..], &[][..]),
-        }
-    }
-
-    /// Forces on the mass of an element, where its nodes have gone to.
-    pub(super) fn pull(
-        &self,
-        pulls: &[&Pull],
-        element: &Element<'_>,
-        moved: &Element<'_>,
-        warmth: &Warmth,
-        force: &mut [f64],
-    ) -> Result<(), Folded> {
         let warm = warmth.now.iter().sum::<f64>() / warmth.now.len() as f64;
         let density = element.density(warm);
-        for pull in pulls {
-            element.volume_force(|at| density * pull.at(moved.place(&at.jets)), force)?;
+        for &pull in pulls {
+            element.volume_force(density * pull, force)?;
         }
         Ok(())
     }

@@ -5,17 +5,19 @@ mod load;
 mod needs;
 mod procedure;
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
+
+use glam::DVec3;
 
 use super::{
-    model::{Course, Damping, Heated, Procedure, Pull, Step},
+    model::{Heated, Procedure, Step},
     read::{Reader, plain},
 };
 use crate::{
     model::interpolate,
     read::{Amplitude, Fault, abaqus::card::Card, quote},
 };
-use procedure::{begin, damping, diameters, procedure};
+use procedure::{begin, procedure};
 
 /// A value, the amplitude that it follows, and the step that set it (0: before the first).
 #[derive(Debug, Clone)]
@@ -31,16 +33,12 @@ pub(super) struct State {
     held: BTreeMap<(u32, u8), Given<f64>>,
     kept: BTreeMap<(u32, u8), Given<f64>>,
     forces: BTreeMap<(u32, u8), Given<f64>>,
-    early: BTreeMap<(u32, u8), Given<f64>>,
     pressures: BTreeMap<(u32, u8), Given<f64>>,
-    pulls: BTreeMap<(String, String), Given<(Vec<u32>, Pull)>>,
+    pulls: BTreeMap<String, Given<(Vec<u32>, DVec3)>>,
     warm: BTreeMap<u32, Given<f64>>,
     temperatures: BTreeMap<u32, Given<f64>>,
     pub(super) heating: BTreeMap<Heated, Given<[f64; 2]>>,
-    materials: BTreeMap<u32, u32>,
     pub(super) step: u32,
-    /// Whether displacements are large: from a step on until one says otherwise.
-    large: bool,
     open: Option<Open>,
     /// When the steps before it ended.
     time: f64,
@@ -52,10 +50,6 @@ struct Open {
     duration: f64,
     perturbs: bool,
     procedure: Option<Procedure>,
-    damping: Damping,
-    diameters: Option<[u32; 2]>,
-    /// Whether displacements follow the temperatures.
-    coupled: bool,
 }
 
 impl State {
@@ -73,24 +67,15 @@ impl State {
             held: times(&self.held)?,
             kept: self.kept.keys().copied().collect(),
             forces: times(&self.forces)?,
-            early: times(&self.early)?,
             pressures: times(&self.pressures)?,
-            materials: self.materials.clone(),
             ..Step::default()
         };
         for pull in self.pulls.values() {
             let factor = factor(&pull.amplitude)?;
             let (elements, pull) = &pull.value;
-            step.pulls.extend(elements.iter().map(|&e| (e, pull.times(factor))));
+            step.pulls.extend(elements.iter().map(|&e| (e, factor * *pull)));
         }
         Ok(step)
-    }
-
-    /// Every amplitude that supports and forces follow.
-    fn amplitudes(&self) -> BTreeSet<Option<String>> {
-        let nodal = [&self.held, &self.forces, &self.early, &self.pressures];
-        let nodal = nodal.into_iter().flat_map(|all| all.values().map(|g| &g.amplitude));
-        nodal.chain(self.pulls.values().map(|g| &g.amplitude)).cloned().collect()
     }
 
     /// Every step that began has ended, and there was one.
@@ -111,26 +96,14 @@ impl Reader {
     /// Everything that has an order.
     pub(super) fn history(&mut self, card: &Card<'_>, state: &mut State) -> Result<(), Fault> {
         let name = plain(card);
-        const WITHIN: &str = "STATIC DYNAMIC FREQUENCY BUCKLE HEATTRANSFER MODALDYNAMIC \
-            COUPLEDTEMPERATURE-DISPLACEMENT UNCOUPLEDTEMPERATURE-DISPLACEMENT STEADYSTATEDYNAMICS \
-            MODALDAMPING SELECTCYCLICSYMMETRYMODES ENDSTEP CLOAD DLOAD DSLOAD TEMPERATURE CFLUX \
-            DFLUX FILM RADIATE CHANGESOLIDSECTION";
+        const WITHIN: &str = "STATIC FREQUENCY BUCKLE HEATTRANSFER ENDSTEP CLOAD DLOAD DSLOAD \
+            TEMPERATURE CFLUX DFLUX FILM RADIATE";
         if WITHIN.split_ascii_whitespace().any(|w| w == name) && state.open.is_none() {
             return Err(card.fault(format!("*{} must stand in a *STEP", card.name)));
         }
         match name.as_str() {
             "STEP" => begin(card, state),
-            "STATIC"
-            | "DYNAMIC"
-            | "FREQUENCY"
-            | "BUCKLE"
-            | "HEATTRANSFER"
-            | "COUPLEDTEMPERATURE-DISPLACEMENT"
-            | "UNCOUPLEDTEMPERATURE-DISPLACEMENT"
-            | "MODALDYNAMIC"
-            | "STEADYSTATEDYNAMICS" => procedure(card, &name, state),
-            "MODALDAMPING" => damping(card, state),
-            "SELECTCYCLICSYMMETRYMODES" => diameters(card, state),
+            "STATIC" | "FREQUENCY" | "BUCKLE" | "HEATTRANSFER" => procedure(card, &name, state),
             "ENDSTEP" => self.close(state),
             "EQUATION" => self.end_equations(card, state),
             "BOUNDARY" => self.boundary(card, state),
@@ -138,7 +111,6 @@ impl Reader {
             "DLOAD" | "DSLOAD" => self.dload(card, state, name == "DSLOAD"),
             "TEMPERATURE" => self.temperature(card, state),
             "CFLUX" | "DFLUX" | "FILM" | "RADIATE" => self.heating(card, state),
-            "CHANGESOLIDSECTION" => self.change(card, state),
             "INITIALCONDITIONS" => self.initial(card),
             "PHYSICALCONSTANTS" => self.constants(card),
             _ => Ok(()),
@@ -148,18 +120,14 @@ impl Reader {
     fn close(&mut self, state: &mut State) -> Result<(), Fault> {
         let Some(open) = state.open.take() else { return Ok(()) };
         self.end(open.procedure.unwrap_or_default(), &open, state)?;
-        if open.coupled {
-            // What the temperatures of the step that has just been added do.
-            self.end(Procedure::Static, &open, state)?;
-        }
         state.time += open.duration;
         Ok(())
     }
 
     /// What is in force at the end of the step.
     fn end(&mut self, procedure: Procedure, open: &Open, state: &State) -> Result<(), Fault> {
-        let &Open { line, duration, diameters, .. } = open;
-        self.suits(procedure, state, line)?;
+        let &Open { line, duration, .. } = open;
+        self.suits(procedure, line)?;
         let in_time = matches!(procedure, Procedure::Heat { steady: false, .. });
         let factor = |amplitude: &Option<String>| -> Result<f64, Fault> {
             let Some(name) = amplitude else { return Ok(1.0) };
@@ -172,23 +140,8 @@ impl Reader {
             let time = if amplitude.total_time { state.time + duration } else { duration };
             Ok(interpolate(&amplitude.points, time).unwrap_or(1.0))
         };
-        let mut step = if let Procedure::Motion { .. }
-        | Procedure::Dynamic { .. }
-        | Procedure::Harmonic { .. } = procedure
-        {
-            Step { courses: self.courses(procedure, state, line)?, ..state.loads(|_| Ok(0.0))? }
-        } else {
-            state.loads(factor)?
-        };
-        (step.procedure, step.damping) = (procedure, open.damping.clone());
-        step.diameters = diameters;
-        if diameters.is_some() && !matches!(procedure, Procedure::Modes { heat: false, .. }) {
-            let why = "*SELECT CYCLIC SYMMETRY MODES stands in a step of *FREQUENCY";
-            return Err(Fault::at(line, why));
-        }
-        let may_be_large = matches!(procedure, Procedure::Static | Procedure::Dynamic { .. });
-        step.large = state.large && may_be_large;
-        if let Procedure::Heat { .. } | Procedure::Modes { heat: true, .. } = procedure {
+        let mut step = Step { procedure, ..state.loads(factor)? };
+        if let Procedure::Heat { .. } = procedure {
             for (&node, given) in &state.temperatures {
                 step.temperatures.insert(node, given.value * factor(&given.amplitude)?);
             }
@@ -211,38 +164,6 @@ impl Reader {
     fn amplitude_of(&self, name: &str, line: u32) -> Result<&Amplitude, Fault> {
         let missing = || Fault::at(line, format!("amplitude {} is not defined", quote(name)));
         self.amplitudes.get(name).ok_or_else(missing)
-    }
-
-    /// What acts in a step of motion or vibration, by the amplitudes that it follows.
-    fn courses(
-        &self,
-        procedure: Procedure,
-        state: &State,
-        line: u32,
-    ) -> Result<Vec<Course>, Fault> {
-        let mut courses = Vec::new();
-        for amplitude in state.amplitudes() {
-            let mut points = Vec::new();
-            if let Some(name) = &amplitude {
-                let found = self.amplitude_of(name, line)?;
-                let in_total = found.total_time && !matches!(procedure, Procedure::Harmonic { .. });
-                let begin = if in_total { state.time } else { 0.0 };
-                points.extend(found.points.iter().map(|&(at, factor)| (at - begin, factor)));
-            }
-            let own = |other: &Option<String>| Ok(if *other == amplitude { 1.0 } else { 0.0 });
-            let mut loads = state.loads(own)?;
-            let base = Step {
-                name: loads.name.clone(),
-                number: state.step,
-                held: loads.held.clone(),
-                materials: loads.materials.clone(),
-                ..Step::default()
-            };
-            loads.held.values_mut().for_each(|value| *value = 0.0);
-            self.moves(&base, &points, procedure, line)?;
-            courses.push(Course { points, loads, base });
-        }
-        Ok(courses)
     }
 }
 

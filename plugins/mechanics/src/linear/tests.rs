@@ -1,4 +1,4 @@
-use std::{collections::BTreeMap, fmt::Write as _, path::Path};
+use std::{fmt::Write as _, path::Path};
 
 use glam::DVec3;
 use intrados_stage::Job;
@@ -239,7 +239,6 @@ fn bars_bear_along_themselves() {
         near(value.sqrt() / (std::f64::consts::TAU * hertz), 1.0, 1e-6);
     }
     assert!(refusal(&deck.replace("120.\n", "")).contains("area of their section"));
-    assert!(refusal(&deck.replacen("*STEP", "*STEP,NLGEOM", 1)).contains("T3D2"));
 }
 
 /// The same bricks by the solver of members.
@@ -372,66 +371,6 @@ fn transformed_supports_and_equations_hold_as_written() {
     }
 }
 
-/// One plane element for the unit square, in each way of closing it, pulled by 1 Pa along x.
-#[test]
-fn planes_are_closed_as_their_names_say() {
-    let quads = |extra: &str| format!("*NODE,NSET=ALL\n1,0,0\n2,1,0\n3,1,1\n4,0,1\n{extra}");
-    let middles = "5,.5,0\n6,1,.5\n7,.5,1\n8,0,.5\n";
-    for (kind, nodes) in
-        [("CPS4", 4), ("CPS8", 8), ("CPS8R", 8), ("CPE4", 4), ("CPE8", 8), ("CPE8R", 8)]
-    {
-        let list: Vec<String> = (1..=nodes).map(|n| n.to_string()).collect();
-        let deck = quads(if nodes == 8 { middles } else { "" })
-            + &format!("*ELEMENT,TYPE={kind},ELSET=ALL\n1,{}\n", list.join(","))
-            + LAW
-            + "*BOUNDARY\n1,1,2\n2,2\n4,1\n"
-            // With four points an element has a motion without strain that only this holds.
-            + if nodes == 8 { "5,2\n8,1\n" } else { "" }
-            + "*STEP\n*STATIC\n*DLOAD\n1,P2,-1.\n*END STEP\n";
-        let u = solve(&deck)[0].displacements[2];
-        let (x, y) = if kind.starts_with("CPS") {
-            (1.0, -0.3)
-        } else {
-            // Plane strain: E/(1 − ν²) and ν/(1 − ν).
-            (0.91, -0.91 * 0.3 / 0.7)
-        };
-        near(200.0 * u.x, x, 1e-10);
-        near(200.0 * u.y, y, 1e-10);
-    }
-}
-
-/// A thin disc of radii 1 and 2 that spins: at its bore σ_θ = ρω²((3 + ν) b² + (1 − ν) a²)/4
-/// (Timoshenko and Goodier, art. 32).
-#[test]
-fn a_disc_that_spins_has_the_stress_of_the_closed_form() {
-    let (n, mut text) = (16, String::from("*NODE,NSET=ALL\n"));
-    let mut known: BTreeMap<(usize, usize), usize> = BTreeMap::new();
-    let mut elements = String::from("*ELEMENT,TYPE=CAX8,ELSET=ALL\n");
-    for e in 0..n {
-        let corners = [(2 * e, 0), (2 * e + 2, 0), (2 * e + 2, 2), (2 * e, 2)];
-        let middles = [(2 * e + 1, 0), (2 * e + 2, 1), (2 * e + 1, 2), (2 * e, 1)];
-        write!(elements, "{}", e + 1).unwrap();
-        for at in corners.into_iter().chain(middles) {
-            let next = known.len() + 1;
-            let number = *known.entry(at).or_insert(next);
-            if number == next {
-                let r = 1.0 + at.0 as f64 / (2 * n) as f64;
-                writeln!(text, "{number},{r:?},{:?}", 0.01 * at.1 as f64).unwrap();
-            }
-            write!(elements, ",{number}").unwrap();
-        }
-        elements.push('\n');
-    }
-    let deck = text
-        + &elements
-        + LAW
-        + "*BOUNDARY\n1,2\n*STEP\n*STATIC\n*DLOAD\nALL,CENTRIF,5.,0.,0.,0.,0.,1.,0.\n*END STEP\n";
-    let solved = solve(&deck);
-    // Displacement of the bore: a σ_θ / E, since its face is free.
-    let expected = 3.0 * 5.0 * (3.3 * 4.0 + 0.7) / 4.0 / 200.0;
-    near(solved[0].displacements[0].x / expected, 1.0, 1e-3);
-}
-
 #[test]
 fn all_that_is_not_computed_is_named_at_once() {
     let deck = "*NODE\n1,0,0\n*ELEMENT,TYPE=F3D8,ELSET=ALL\n1,1\n*MATERIAL,NAME=M\n*CREEP\n1,2\n*STEP\n*COMPLEX FREQUENCY\n3\n*END STEP\n";
@@ -441,6 +380,74 @@ fn all_that_is_not_computed_is_named_at_once() {
     {
         assert!(line.contains(part), "{line}");
     }
+}
+
+/// Cards, elements and parameters that other programs compute and this one does not.
+#[test]
+fn what_is_not_computed_is_refused_by_its_name() {
+    for card in [
+        "DYNAMIC",
+        "MODAL DYNAMIC",
+        "STEADY STATE DYNAMICS",
+        "MODAL DAMPING",
+        "DAMPING",
+        "DASHPOT",
+        "CYCLIC SYMMETRY MODEL",
+        "SELECT CYCLIC SYMMETRY MODES",
+        "RIGID BODY",
+        "MPC",
+        "DISTRIBUTING COUPLING",
+        "PRE-TENSION SECTION",
+        "GAP",
+        "PLASTIC",
+        "CYCLIC HARDENING",
+        "HYPERELASTIC",
+        "HYPERFOAM",
+        "DEFORMATION PLASTICITY",
+        "COUPLED TEMPERATURE-DISPLACEMENT",
+        "UNCOUPLED TEMPERATURE-DISPLACEMENT",
+        "CHANGE SOLID SECTION",
+        "NODAL THICKNESS",
+        "MEMBRANE",
+    ] {
+        let line = refusal(&format!("*NODE\n1,0,0\n*{card}\n"));
+        assert!(line.contains(&format!("deck.inp:3: *{card} is not computed")), "{line}");
+    }
+    for kind in ["DASHPOTA", "GAPUNI", "DCOUP3D", "CPS4", "CPE8R", "CAX8"] {
+        let line = refusal(&format!("*NODE\n1,0,0\n*ELEMENT,TYPE={kind}\n1,1\n"));
+        assert!(line.contains(&format!("elements of type \"{kind}\" are not computed")), "{line}");
+    }
+    let mut body = Body::default();
+    let shape = body.fill("C3D8", UNIT, [1, 1, 1]);
+    let good = body.text("C3D8")
+        + LAW
+        + &body.corner()
+        + "*NODE\n90,2,0,0\n*ELEMENT,TYPE=SPRINGA,ELSET=S\n90,1,90\n*SPRING,ELSET=S\n1.\n*BOUNDARY\n90,1,3\n\
+           *SURFACE,NAME=END\n"
+        + &body.faces(shape, |p| p.x > 1.0 - 1e-9)
+        + "*TIE,NAME=T\nEND,END\n*INITIAL CONDITIONS,TYPE=STRESS\n1,1,0.,0.,0.,0.,0.,0.\n\
+           *AMPLITUDE,NAME=A\n0.,1.\n*STEP\n*STATIC\n*CLOAD,AMPLITUDE=A\n3,1,1.\n*END STEP\n";
+    assert!(parse(good.as_bytes(), Path::new("deck.inp"), Units::MetreNewton).is_ok());
+    for (old, new, named) in [
+        ("*STEP\n", "*STEP,NLGEOM\n", "*STEP, NLGEOM"),
+        ("*SPRING,", "*SPRING,NONLINEAR,", "*SPRING: parameter \"NONLINEAR\""),
+        ("*TIE,", "*TIE,CYCLIC SYMMETRY,", "*TIE: parameter \"CYCLIC SYMMETRY\""),
+        ("*CLOAD,", "*CLOAD,LOAD CASE=2,", "*CLOAD: parameter \"LOAD CASE\""),
+        ("*CLOAD,", "*CLOAD,TIME DELAY=1.,", "*CLOAD: parameter \"TIME DELAY\""),
+        ("*STATIC\n", "*HEAT TRANSFER,FREQUENCY\n", "*HEAT TRANSFER: parameter \"FREQUENCY\""),
+        ("*CLOAD,", "*DLOAD\nALL,CENTRIF,5.,0.,0.,0.,0.,1.,0.\n*CLOAD,", "load \"CENTRIF\""),
+        (
+            "*STEP\n",
+            "*SHELL SECTION,ELSET=S,COMPOSITE\n1.,,M\n*STEP\n",
+            "*SHELL SECTION: parameter \"COMPOSITE\"",
+        ),
+        ("TYPE=STRESS", "TYPE=PLASTIC STRAIN", "TYPE=\"PLASTIC STRAIN\""),
+    ] {
+        let line = refusal(&good.replacen(old, new, 1));
+        assert!(line.contains(named), "{line}");
+    }
+    let small = good.replace("*STEP\n", "*STEP,NLGEOM=NO\n");
+    assert!(parse(small.as_bytes(), Path::new("deck.inp"), Units::MetreNewton).is_ok());
 }
 
 #[test]

@@ -17,10 +17,10 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::{
     constraint::Equation,
-    curve::{Curve, terms},
     model::{Cell, Deck},
     read::{Kind, Reader, Section},
     shape::{GAUSS_2, Point, Shape, face_functions, face_places},
+    turn::{body, terms, turn},
 };
 use crate::read::{
     Fault,
@@ -42,9 +42,8 @@ pub(super) enum Profile {
     /// Of solids and planes.
     #[default]
     Whole,
-    /// How far the middle lies off the nodes along the normal, over the thickness; thickness,
-    /// material and axes of every layer from below, where it has some.
-    Shell { offset: f64, layers: Vec<(f64, u32, Option<u32>)> },
+    /// How far the middle lies off the nodes along the normal, over the thickness.
+    Shell { offset: f64 },
     /// Its 1-direction; its sizes along both, and how far the nodes lie off its middle over these.
     Beam { first: DVec3, size: [f64; 2], offset: [f64; 2], form: Form },
 }
@@ -153,7 +152,7 @@ impl Thin {
     /// Axes at each of its nodes.
     fn axes(self, places: &[DVec3], section: &Section) -> Option<Vec<Axes>> {
         match (self, &section.profile) {
-            (Self::Shell { .. }, Profile::Shell { offset, .. }) => {
+            (Self::Shell { .. }, Profile::Shell { offset }) => {
                 let normal = |at: &[f64; 2]| {
                     let jets = face_functions(places.len(), *at);
                     let along = |i: usize| -> DVec3 {
@@ -354,9 +353,10 @@ impl Reader {
             }
             _ => vec![DMat3::IDENTITY],
         };
-        let widens = (3 * stretch..).zip(widens).collect();
+        let widens: Vec<(u32, DMat3)> = (3 * stretch..).zip(widens).collect();
         self.turning.insert(node, turning);
-        self.bound(Curve::Body { reference: node, turning, unit: 1.0, nodes, widens }, 0);
+        let equations = body(&self.deck.nodes, [node, turning], &nodes, &widens);
+        self.deck.equations.extend(equations);
         if extent == 1 {
             // What lies on a line says nothing of turning about it.
             let terms = terms(&[(turning, axes[0])]);
@@ -389,9 +389,9 @@ impl Reader {
         // About the node's own axes: mean angles are not a vector.
         let own = self.deck.turned.get(&node).map(|frame| frame.map(DVec3::from_array));
         for (i, axis) in (0..).zip(own.unwrap_or(DVec3::AXES)) {
-            let (nodes, angle) = (ring.outer.clone(), 3 * turning + i);
             // Two nodes along an axis say nothing of a turn about it.
-            self.bound(Curve::Turn { nodes, axis, angle, unit: 1.0 }, row.line);
+            let equation = turn(&self.deck.nodes, &ring.outer, axis, 3 * turning + i, row.line);
+            self.deck.equations.extend(equation);
         }
         self.turning.insert(node, turning);
         Some(turning)
@@ -416,7 +416,6 @@ impl Reader {
         let raw = &self.raw[element as usize];
         let ring = |place| self.rings.of.get(&(element, place)).map(|&n| &self.rings.all[n]);
         let rings: Vec<&Ring> = (0..raw.nodes.len()).filter_map(ring).collect();
-        let (points, materials) = integration(thin, section);
         Cell {
             label: raw.label,
             shape: thin.shape(),
@@ -424,8 +423,7 @@ impl Reader {
             material: section.material,
             orientation: section.orientation,
             across: 0.0,
-            points,
-            layers: materials,
+            points: integration(section),
         }
     }
 }
@@ -517,41 +515,18 @@ fn dyad(a: DVec3, b: DVec3) -> DMat3 {
     DMat3::from_cols(b.x * a, b.y * a, b.z * a)
 }
 
-/// Points of integration and the material and axes at each, where they are not those of the shape.
-type Integration = (Vec<Point>, Vec<(u32, Option<u32>)>);
-
-fn integration(thin: Thin, section: &Section) -> Integration {
-    match &section.profile {
-        Profile::Shell { layers, .. } if !layers.is_empty() => layered(thin.shape(), layers),
-        &Profile::Beam { size, form: form @ (Form::Pipe(_) | Form::Box(_)), .. } => {
-            let around = match form {
-                Form::Box(thick) => walls(size, thick),
-                Form::Pipe(wall) => pipe(size[0], wall),
-                Form::Full | Form::Round => Vec::new(),
-            };
-            let row = |&(x, w): &(f64, f64)| {
-                around.iter().map(move |&([y, z], v)| ([x, y, z], w * v)).collect::<Vec<_>>()
-            };
-            (GAUSS_2.iter().flat_map(row).collect(), Vec::new())
-        }
-        _ => (Vec::new(), Vec::new()),
-    }
-}
-
-/// The points of the shape, once in every layer.
-fn layered(shape: Shape, layers: &[(f64, u32, Option<u32>)]) -> Integration {
-    let whole: f64 = layers.iter().map(|l| l.0).sum();
-    let (mut points, mut materials, mut below) = (Vec::new(), Vec::new(), 0.0);
-    for &(thickness, material, axes) in layers {
-        let share = thickness / whole;
-        for ([x, y, z], weight) in shape.points() {
-            let height = 2.0 * (below + 0.5 * (z + 1.0) * thickness) / whole - 1.0;
-            points.push(([x, y, height], weight * share));
-            materials.push((material, axes));
-        }
-        below += thickness;
-    }
-    (points, materials)
+/// Points of integration, where they are not those of the shape.
+fn integration(section: &Section) -> Vec<Point> {
+    let Profile::Beam { size, form, .. } = section.profile else { return Vec::new() };
+    let around = match form {
+        Form::Box(thick) => walls(size, thick),
+        Form::Pipe(wall) => pipe(size[0], wall),
+        Form::Full | Form::Round => return Vec::new(),
+    };
+    let row = |&(x, w): &(f64, f64)| {
+        around.iter().map(move |&([y, z], v)| ([x, y, z], w * v)).collect::<Vec<_>>()
+    };
+    GAUSS_2.iter().flat_map(row).collect()
 }
 
 /// Eight points on the circle that has the tube's moment of inertia, in natural coordinates of the

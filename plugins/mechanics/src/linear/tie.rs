@@ -16,13 +16,13 @@ pub(super) struct Face {
 }
 
 /// A node's place on a face.
-pub(super) struct Foot {
-    pub(super) nodes: Vec<u32>,
-    pub(super) shares: Vec<f64>,
+struct Foot {
+    nodes: Vec<u32>,
+    shares: Vec<f64>,
     place: DVec3,
     /// How far off the face, and how far beside it.
-    pub(super) off: f64,
-    pub(super) beside: f64,
+    off: f64,
+    beside: f64,
 }
 
 /// How far beside a face a node may lie, and off it unless the deck says so, over the face's reach.
@@ -45,13 +45,8 @@ impl Face {
         &self.nodes
     }
 
-    /// How far its nodes lie from its middle at most.
-    pub(super) fn reach(&self) -> f64 {
-        self.reach
-    }
-
     /// Its point nearest to a place.
-    pub(super) fn foot(&self, deck: &Deck, place: DVec3) -> Foot {
+    fn foot(&self, deck: &Deck, place: DVec3) -> Foot {
         let triangle = self.nodes.len().is_multiple_of(3);
         let mut at = if triangle { [1.0 / 3.0; 2] } else { [0.0; 2] };
         for _ in 0..STEPS {

@@ -1,7 +1,6 @@
 //! What heats: temperatures that are held, fluxes, films and radiation.
 
 use super::{
-    flat::SLICE,
     model::Heating,
     read::{Reader, plain},
     steps::{Given, State, clear},
@@ -57,11 +56,8 @@ impl Reader {
                         return Err(row.fault("the component of a *CFLUX is 11"));
                     }
                     let value = row.number(value)? * self.units.length();
-                    let around = self.around_nodes();
                     for node in self.some_nodes(target, row)? {
-                        // A flux into what is axially symmetric is that on the whole circle.
-                        let share = if around.contains(&node) { SLICE / 360.0 } else { 1.0 };
-                        put((Heating::Node, node, 0), [value * share, 0.0]);
+                        put((Heating::Node, node, 0), [value, 0.0]);
                     }
                 }
                 "DFLUX" => {

@@ -73,9 +73,6 @@ impl Reader {
         if plain(card) != "TIE" {
             return Ok(());
         }
-        if card.get("CYCLIC SYMMETRY").is_some() {
-            return self.sided(card);
-        }
         card.only(&["NAME", "POSITION TOLERANCE", "ADJUST"])?;
         let row = card.one_row()?.ok_or_else(|| card.fault("needed are: slave, master"))?;
         let [slave, master] = row.exactly("slave, master")?;

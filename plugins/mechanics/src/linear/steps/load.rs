@@ -1,17 +1,13 @@
 //! Supports and loads, temperatures and initial stress.
 
-use std::collections::BTreeSet;
-
 use glam::DVec3;
 
-use super::{Given, Open, State, clear};
+use super::{Given, State, clear};
 use crate::{
     linear::{
-        flat::{Plane, SLICE},
         law::ORDER,
         mesh::name_of,
-        model::{Procedure, Pull},
-        read::{Kind, Raw, Reader, Surface},
+        read::{Kind, Reader, Surface},
         thin::Thin,
         warm::is_temperature,
     },
@@ -20,7 +16,7 @@ use crate::{
         abaqus::card::{Card, Row},
         quote,
     },
-    tensor::{self, Voigt},
+    tensor,
 };
 
 impl Reader {
@@ -98,44 +94,20 @@ impl Reader {
         Ok(((turning.ok_or_else(none)?, angle), 1.0))
     }
 
-    /// `*CHANGE SOLID SECTION`
-    pub(super) fn change(&mut self, card: &Card<'_>, state: &mut State) -> Result<(), Fault> {
-        card.only(&["ELSET", "MATERIAL"])?;
-        let material = card.need("MATERIAL")?;
-        let undefined = || card.fault(format!("material {} is not defined", quote(&material)));
-        let &material = self.materials.get(&material).ok_or_else(undefined)?;
-        for element in self.named_elements(card)? {
-            if let Some(cell) = self.raw[element as usize].cell {
-                state.materials.insert(cell, material);
-            }
-        }
-        Ok(())
-    }
-
     /// Forces. What is given twice in a step adds up, as in CalculiX.
     pub(super) fn cload(&mut self, card: &Card<'_>, state: &mut State) -> Result<(), Fault> {
-        card.only(&["OP", "AMPLITUDE", "TIME DELAY", "LOAD CASE"])?;
+        card.only(&["OP", "AMPLITUDE"])?;
         clear(card, state.step, &mut state.forces, |_| true)?;
-        clear(card, state.step, &mut state.early, |_| true)?;
-        let forces = match card.get("LOAD CASE") {
-            None | Some("1") => &mut state.forces,
-            Some("2") if harmonic(state.open.as_ref()) => &mut state.early,
-            Some(_) => {
-                return Err(card.fault("LOAD CASE is 1, or 2 in *STEADY STATE DYNAMICS"));
-            }
-        };
-        let amplitude = self.delayed(card)?;
-        let around = self.around_nodes();
+        let amplitude = name_of(card, "AMPLITUDE")?;
+        let forces = &mut state.forces;
         for row in card.rows() {
             let [target, direction, value] = row.exactly("node or set, component, force")?;
             let (direction, value) = (component(direction, row)?, row.number(value)?);
             for node in self.some_nodes(target, row)? {
-                // A force on what is axially symmetric is that on the whole circle.
-                let share = if around.contains(&node) { SLICE / 360.0 } else { 1.0 };
                 let (at, _) = self.motion(node, direction, None, row)?;
                 // A moment is of newtons and lengths.
                 let unit = if direction < 3 { 1.0 } else { self.units.length() };
-                let mut value = value * share * unit;
+                let mut value = value * unit;
                 if let Some(old) = forces.get(&at)
                     && old.step == state.step
                 {
@@ -146,35 +118,6 @@ impl Reader {
             }
         }
         Ok(())
-    }
-
-    /// The amplitude that a card names, which begins later where it says so.
-    fn delayed(&mut self, card: &Card<'_>) -> Result<Option<String>, Fault> {
-        let (Some(name), Some(delay)) = (name_of(card, "AMPLITUDE")?, card.get("TIME DELAY"))
-        else {
-            return name_of(card, "AMPLITUDE");
-        };
-        let wrong = || card.fault(format!("TIME DELAY={} is no time", quote(delay)));
-        let by: f64 = delay.parse().map_err(|_| wrong())?;
-        let mut later = self.amplitude_of(&name, card.line)?.clone();
-        later.points.iter_mut().for_each(|p| p.0 += by);
-        later.name = format!("{name} {by} s later");
-        let name = later.name.clone();
-        self.amplitudes.insert(name.clone(), later);
-        Ok(Some(name))
-    }
-
-    /// Nodes of planes where some are axially symmetric: all of them are in the slice then.
-    pub(in crate::linear) fn around_nodes(&self) -> BTreeSet<u32> {
-        let is_around = self.is_around();
-        let flat = |r: &&Raw| is_around && matches!(r.kind, Kind::Flat(_));
-        self.raw.iter().filter(flat).flat_map(|r| r.nodes.iter().copied()).collect()
-    }
-
-    /// Whether a slice stands for what is axially symmetric.
-    pub(in crate::linear) fn is_around(&self) -> bool {
-        let around = |kind| matches!(kind, Kind::Flat(flat) if flat.plane == Plane::Around);
-        self.raw.iter().any(|r| around(r.kind))
     }
 
     pub(super) fn dload(
@@ -196,11 +139,11 @@ impl Reader {
             };
             let (kind, value) = (kind.to_ascii_uppercase(), row.number(value)?);
             let step = state.step;
-            if matches!(kind.as_str(), "GRAV" | "CENTRIF") && !on_surface {
+            if kind == "GRAV" && !on_surface {
                 let elements = self.some_cells(target, row)?;
-                let pull = self.pull(&kind, value, rest, row)?;
+                let pull = self.acceleration(value, rest, row)?;
                 let given = Given { value: (elements, pull), amplitude: amplitude.clone(), step };
-                state.pulls.insert((target.to_ascii_uppercase(), kind), given);
+                state.pulls.insert(target.to_ascii_uppercase(), given);
                 continue;
             }
             for face in self.loaded(target, &kind, on_surface, row)? {
@@ -220,7 +163,7 @@ impl Reader {
         on_surface: bool,
         row: Row<'_>,
     ) -> Result<Vec<(u32, u8)>, Fault> {
-        let kinds = "P1 to P6, GRAV and CENTRIF, and P on a *DSLOAD";
+        let kinds = "P1 to P6 and GRAV, and P on a *DSLOAD";
         let is_face = kind.len() == 2 && kind.starts_with('P');
         match (on_surface, self.surfaces.get(&target.to_ascii_uppercase())) {
             (true, Some(Surface::Faces(faces))) if kind == "P" => Ok(self.cell_faces(faces)),
@@ -253,20 +196,12 @@ impl Reader {
         faces.iter().filter_map(|&(e, face)| Some((self.raw[e as usize].cell?, face))).collect()
     }
 
-    /// Weight: g and its direction. Spin: ω², a point of the axis and its direction.
-    fn pull(&self, kind: &str, value: f64, rest: &[&str], row: Row<'_>) -> Result<Pull, Fault> {
+    /// g and its direction.
+    fn acceleration(&self, g: f64, rest: &[&str], row: Row<'_>) -> Result<DVec3, Fault> {
         let numbers = rest.iter().map(|w| row.number(w)).collect::<Result<Vec<_>, _>>()?;
-        let length = self.units.length();
-        match (kind, numbers.as_slice()) {
-            ("GRAV", &[x, y, z]) => Ok(Pull::Weight(value * length * DVec3::new(x, y, z))),
-            ("CENTRIF", &[x, y, z, a, b, c]) => {
-                let axis = DVec3::new(a, b, c).try_normalize();
-                let axis = axis.ok_or_else(|| row.fault("the axis has no length"))?;
-                Ok(Pull::Spin { origin: length * DVec3::new(x, y, z), axis, squared: value })
-            }
-            _ => Err(row.fault(
-                "needed are: set, GRAV, g, and its direction; or set, CENTRIF, ω², a point of the axis and its direction",
-            )),
+        match numbers.as_slice() {
+            &[x, y, z] => Ok(g * self.units.length() * DVec3::new(x, y, z)),
+            _ => Err(row.fault("needed are: set, GRAV, g, and its direction")),
         }
     }
 
@@ -299,30 +234,16 @@ impl Reader {
                 }
                 Ok(())
             }
-            "STRESS" => {
-                self.at_points(card, |reader, _, v| tensor::scale(&v, reader.units.stress()))
+            "STRESS" => self.stress(card),
+            _ => {
+                Err(card
+                    .fault(format!("TYPE={}: TEMPERATURE and STRESS are supported", quote(&kind))))
             }
-            "PLASTIC STRAIN" | "PLASTICSTRAIN" => self.at_points(card, |reader, e, mut v| {
-                (3..6).for_each(|i| v[i] *= 2.0);
-                let cell = &reader.deck.cells[e as usize];
-                let law = reader.deck.materials[cell.material as usize].elastic.as_ref();
-                let cold = cell.nodes.first().map_or(0.0, |&n| reader.deck.cold[n as usize]);
-                let law = law.map_or([[0.0; 6]; 6], |l| l.stiffness(cold));
-                tensor::scale(&tensor::apply(&law, &v), -1.0)
-            }),
-            _ => Err(card.fault(format!(
-                "TYPE={}: TEMPERATURE, STRESS and PLASTIC STRAIN are supported",
-                quote(&kind)
-            ))),
         }
     }
 
     /// Element, point, and six numbers in Abaqus' order.
-    fn at_points(
-        &mut self,
-        card: &Card<'_>,
-        stress: impl Fn(&Self, u32, Voigt) -> Voigt,
-    ) -> Result<(), Fault> {
+    fn stress(&mut self, card: &Card<'_>) -> Result<(), Fault> {
         for row in card.rows() {
             let what = "element, point, 11, 22, 33, 12, 13, 23";
             let [element, point, numbers @ ..] = row.exactly::<8>(what)?;
@@ -335,16 +256,12 @@ impl Reader {
                 let point = point.parse::<u32>().ok().filter(|p| (1..=points as u32).contains(p));
                 let point = point
                     .ok_or_else(|| row.fault(format!("a point is a number from 1 to {points}")))?;
-                let stress = stress(self, element, given);
+                let stress = tensor::scale(&given, self.units.stress());
                 self.deck.stress.insert((element, point - 1), stress);
             }
         }
         Ok(())
     }
-}
-
-fn harmonic(open: Option<&Open>) -> bool {
-    matches!(open.and_then(|o| o.procedure), Some(Procedure::Harmonic { .. }))
 }
 
 pub(super) fn component(word: &str, row: Row<'_>) -> Result<u8, Fault> {

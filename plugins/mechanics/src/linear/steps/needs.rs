@@ -1,118 +1,26 @@
 //! What a step needs before it can be computed: of materials, of elements, of the steps before it.
 
-use super::State;
 use crate::{
     linear::{
-        law::Elastic,
-        link::Link,
-        model::{Material, Procedure, Pull, Spring, Step},
+        model::{Material, Procedure},
         read::{Kind, Reader},
-        shape::Shape,
     },
-    model::interpolate,
     read::Fault,
 };
 
 impl Reader {
-    /// Supports that move begin where they are, in fixed increments, and carry what has no stress.
-    pub(super) fn moves(
-        &self,
-        base: &Step,
-        points: &[(f64, f64)],
-        procedure: Procedure,
-        line: u32,
-    ) -> Result<(), Fault> {
-        let in_modes = !matches!(procedure, Procedure::Dynamic { .. });
-        if !in_modes || base.held.values().all(|value| *value == 0.0) {
-            return Ok(());
-        }
-        let is_stressed = |s: &Step| matches!(s.procedure, Procedure::Modes { stressed: true, .. });
-        if self.deck.steps.iter().any(is_stressed) {
-            return Err(Fault::at(
-                line,
-                "supports that move what is under stress are not computed",
-            ));
-        }
-        if self.deck.springs.iter().any(|s| !s.drag.is_empty()) {
-            return Err(Fault::at(line, "supports that move beside dashpots are not computed"));
-        }
-        let Procedure::Motion { increment, .. } = procedure else { return Ok(()) };
-        let follows =
-            self.deck.steps.last().is_some_and(|s| matches!(s.procedure, Procedure::Motion { .. }));
-        if follows || interpolate(points, 0.0).unwrap_or(1.0) != 0.0 {
-            let why = "supports that move need an AMPLITUDE that begins at 0, in the first step of motion";
-            return Err(Fault::at(line, why));
-        }
-        if increment.is_none() {
-            return Err(Fault::at(line, "supports that move need fixed increments, not DIRECT=NO"));
-        }
-        Ok(())
-    }
-
     /// Materials have what the step needs, and the step follows one that it rests on.
-    pub(super) fn suits(
-        &self,
-        procedure: Procedure,
-        state: &State,
-        line: u32,
-    ) -> Result<(), Fault> {
-        let used =
-            self.deck.cells.iter().map(|c| c.material).chain(state.materials.values().copied());
-        let lacks = |has: fn(&Material) -> bool, what: &str| {
-            let mut used = used.clone().map(|m| &self.deck.materials[m as usize]);
-            match used.find(|m| !has(m)) {
-                Some(m) => Err(Fault::at(line, format!("material {} has no {what}", m.name))),
-                None => Ok(()),
-            }
+    pub(super) fn suits(&self, procedure: Procedure, line: u32) -> Result<(), Fault> {
+        let used = self.deck.cells.iter().map(|c| &self.deck.materials[c.material as usize]);
+        let lacks = |has: fn(&Material) -> bool, what: &str| match used.clone().find(|m| !has(m)) {
+            Some(m) => Err(Fault::at(line, format!("material {} has no {what}", m.name))),
+            None => Ok(()),
         };
-        let heats =
-            matches!(procedure, Procedure::Heat { .. } | Procedure::Modes { heat: true, .. });
-        let may_be_large = matches!(procedure, Procedure::Static | Procedure::Dynamic { .. });
+        let heats = matches!(procedure, Procedure::Heat { .. });
         if !heats {
-            let has: fn(&Material) -> bool = if state.large && may_be_large {
-                |m| m.elastic.is_some() || m.finite.is_some()
-            } else {
-                |m| m.elastic.is_some()
-            };
-            lacks(
-                has,
-                "*ELASTIC, nor with NLGEOM *HYPERELASTIC, *HYPERFOAM or *DEFORMATION PLASTICITY",
-            )?;
-            let flows = match procedure {
-                Procedure::Static | Procedure::Dynamic { .. } => state.large,
-                other => matches!(other, Procedure::Modes { .. }),
-            };
-            let is_known = |m: &Material| {
-                (flows && matches!(m.elastic, Some(Elastic::Isotropic(_)))) || m.plastic.is_none()
-            };
-            let mut used = used.clone().map(|m| &self.deck.materials[m as usize]);
-            if let Some(material) = used.find(|m| !is_known(m)) {
-                let why = "*PLASTIC is computed of what is isotropic, with NLGEOM";
-                return Err(Fault::at(line, format!("material {}: {why}", material.name)));
-            }
+            lacks(|m| m.elastic.is_some(), "*ELASTIC")?;
         }
-        if let Procedure::Motion { .. } | Procedure::Harmonic { .. } = procedure {
-            return self.vibrates(state, line);
-        }
-        if let Procedure::Dynamic { .. } = procedure {
-            lacks(|m| m.density.is_some(), "*DENSITY")?;
-            if !state.warm.is_empty() {
-                return Err(Fault::at(line, "a *TEMPERATURE in a *DYNAMIC step is not computed"));
-            }
-        }
-        if state.large && may_be_large {
-            return self.turns();
-        }
-        let bends = |s: &Spring| !s.law.is_empty() || s.gap.is_some();
-        if !heats && self.deck.springs.iter().any(bends) {
-            let why = "*SPRING, NONLINEAR and *GAP are computed with NLGEOM alone";
-            return Err(Fault::at(line, why));
-        }
-        let was_large = self.deck.steps.last().is_some_and(|s| s.large);
-        if was_large && matches!(procedure, Procedure::Buckling { .. }) {
-            return Err(Fault::at(line, "*BUCKLE after large displacements is not computed"));
-        }
-        if let Procedure::Modes { heat: false, .. } = procedure {
+        if let Procedure::Modes { .. } = procedure {
             lacks(|m| m.density.is_some(), "*DENSITY")?;
         }
         if let Procedure::Modes { stressed: true, .. } = procedure {
@@ -122,9 +30,6 @@ impl Reader {
                     line,
                     "PERTURBATION: needed is a *STATIC step before this one",
                 ));
-            }
-            if before.is_some_and(|s| s.pulls.iter().any(|p| matches!(p.1, Pull::Spin { .. }))) {
-                return Err(Fault::at(line, "vibrations of what spins are not computed"));
             }
         }
         if !heats {
@@ -141,40 +46,6 @@ impl Reader {
         }
         if self.tied {
             return Err(Fault::at(line, "heat through a *TIE is not computed"));
-        }
-        Ok(())
-    }
-
-    /// Every element is known where displacements are large.
-    fn turns(&self) -> Result<(), Fault> {
-        let lacks = |kind: Kind| match kind {
-            Kind::Solid(Shape::Hex8Mean | Shape::Bar) => Some("C3D8R and T3D2"),
-            Kind::Link(Link::Damper) => Some("dashpots"),
-            _ => None,
-        };
-        match self.raw.iter().find_map(|raw| Some((raw, lacks(raw.kind)?))) {
-            None => Ok(()),
-            Some((raw, what)) => {
-                let why = "are not computed where displacements are large (NLGEOM)";
-                Err(Fault::at(raw.line, format!("element {}: {what} {why}", raw.label)))
-            }
-        }
-    }
-
-    /// A step of motion or vibration follows one of frequencies, and nothing warms in it.
-    fn vibrates(&self, state: &State, line: u32) -> Result<(), Fault> {
-        let is_modes = |s: &Step| matches!(s.procedure, Procedure::Modes { heat: false, .. });
-        match self.deck.steps.iter().rev().find(|s| is_modes(s)) {
-            None => {
-                return Err(Fault::at(line, "needed is a step of *FREQUENCY before this one"));
-            }
-            Some(step) if step.diameters.is_some() => {
-                return Err(Fault::at(line, "motion by modes of sectors is not computed"));
-            }
-            Some(_) => {}
-        }
-        if !state.warm.is_empty() {
-            return Err(Fault::at(line, "a *TEMPERATURE in motion by modes is not computed"));
         }
         Ok(())
     }
