@@ -36,7 +36,6 @@ pub(super) struct Warmth {
 }
 
 /// An element with the places of its nodes.
-#[derive(Clone)]
 pub(super) struct Element<'a> {
     cell: &'a Cell,
     material: &'a Material,
@@ -299,7 +298,7 @@ impl<'a> Element<'a> {
     }
 
     /// The place where its functions are these.
-    pub(super) fn place(&self, jets: &[Jet]) -> DVec3 {
+    fn place(&self, jets: &[Jet]) -> DVec3 {
         jets.iter().zip(&self.places).map(|(j, &x)| j.value * x).sum()
     }
 

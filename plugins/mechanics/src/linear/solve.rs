@@ -1,6 +1,6 @@
 //! Steps to displacements and stresses: T ᵀ K T q = Tᵀ (f − K c), factorised.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::HashMap;
 
 use glam::DVec3;
 use intrados_stage::{Cancelled, Job};
@@ -120,17 +120,17 @@ const TOLERANCE: f64 = 1e-6;
 
 /// What the steps before leave to the next.
 #[derive(Default)]
-pub(super) struct Past {
+struct Past {
     /// Of every unknown; empty before the first step.
-    pub(super) displacements: Vec<f64>,
-    pub(super) stresses: Vec<Vec<Voigt>>,
+    displacements: Vec<f64>,
+    stresses: Vec<Vec<Voigt>>,
     /// Of every node.
-    pub(super) temperatures: Vec<f64>,
+    temperatures: Vec<f64>,
 }
 
 impl Past {
     /// Before the first step.
-    pub(super) fn of(deck: &Deck) -> Self {
+    fn of(deck: &Deck) -> Self {
         Self { temperatures: deck.cold.clone(), ..Self::default() }
     }
 }
@@ -155,8 +155,9 @@ impl Deck {
     fn step(&self, step: &Step, past: &mut Past, job: &Job) -> Result<Solved, LinearError> {
         match step.procedure {
             Procedure::Modes { count, stressed } => {
-                let (system, all) = self.vibrating(step, count, stressed, past, job)?;
-                Ok(system.eigenvalues(all))
+                let system = System::new(self, step, past)?;
+                let stresses = if stressed { past.stresses.as_slice() } else { &[] };
+                Ok(system.eigenvalues(system.vibrating(count, stresses, job)?))
             }
             Procedure::Buckling { count } => {
                 let system = System::new(self, step, past)?;
@@ -166,29 +167,12 @@ impl Deck {
                 let time = (!steady).then_some([first, duration]);
                 heat::solve(self, step, time, &mut past.temperatures, job)
             }
-            _ => System::new(self, step, past)?.solve(past, job),
+            Procedure::Static => System::new(self, step, past)?.solve(past, job),
         }
     }
 
-    /// The first modes of motion, with the stresses of the step before or without.
-    fn vibrating<'a>(
-        &'a self,
-        step: &'a Step,
-        count: usize,
-        stressed: bool,
-        past: &Past,
-        job: &Job,
-    ) -> Result<(System<'a>, Vec<f64>), LinearError> {
-        let system = System::new(self, step, past)?;
-        let stresses = if stressed { past.stresses.as_slice() } else { &[] };
-        let stiffness = system.stiff_under(stresses, job)?;
-        let (mass, _) = system.mass(job)?;
-        let all = system.smallest(stiffness, &mass, count, job)?;
-        Ok((system, all))
-    }
-
     /// What is held in a step, then what binds the rest.
-    pub(super) fn constraints(&self, step: &Step, past: &Past) -> Vec<Equation> {
+    fn constraints(&self, step: &Step, past: &Past) -> Vec<Equation> {
         let equation = |(node, component), value| Equation {
             terms: self.component(node, component),
             value,
@@ -212,17 +196,17 @@ impl Deck {
 }
 
 /// A step and its constraints.
-pub(super) struct System<'a> {
-    pub(super) deck: &'a Deck,
-    pub(super) step: &'a Step,
+struct System<'a> {
+    deck: &'a Deck,
+    step: &'a Step,
     /// Temperature of every node.
     warm: Vec<f64>,
     /// What is solved for, by elements and after them by springs.
-    pub(super) free: Free<'a>,
+    free: Free<'a>,
 }
 
 impl<'a> System<'a> {
-    pub(super) fn new(deck: &'a Deck, step: &'a Step, past: &Past) -> Result<Self, LinearError> {
+    fn new(deck: &'a Deck, step: &'a Step, past: &Past) -> Result<Self, LinearError> {
         let sums = sums(deck, step, &deck.constraints(step, past))?;
         let warm = if step.warm.is_empty() { &past.temperatures } else { &step.warm };
         let count = deck.cells.len() + deck.springs.len();
@@ -232,16 +216,16 @@ impl<'a> System<'a> {
     }
 
     /// Temperatures of the nodes of an element.
-    pub(super) fn warmth(&self, e: usize) -> Warmth {
+    fn warmth(&self, e: usize) -> Warmth {
         let of = |all: &[f64]| self.deck.cells[e].nodes.iter().map(|&n| all[n as usize]).collect();
         Warmth { now: of(&self.warm), cold: of(&self.deck.cold) }
     }
 
-    pub(super) fn initial(&self, e: usize) -> impl Fn(usize) -> Voigt + '_ {
+    fn initial(&self, e: usize) -> impl Fn(usize) -> Voigt + '_ {
         move |p| self.deck.stress.get(&(e as u32, p as u32)).copied().unwrap_or(tensor::ZERO)
     }
 
-    pub(super) fn element(&self, e: usize) -> Element<'a> {
+    fn element(&self, e: usize) -> Element<'a> {
         Element::new(self.deck, e)
     }
 
@@ -272,7 +256,7 @@ impl<'a> System<'a> {
     }
 
     /// Tᵀ K T and Tᵀ (f − K c) of what `fill` says of elements and springs.
-    pub(super) fn assembled(
+    fn assembled(
         &self,
         job: &Job,
         fill: impl Fn(usize, &mut [f64], &mut [f64]) -> Result<(), Folded> + Sync,
@@ -282,19 +266,14 @@ impl<'a> System<'a> {
 
     fn solve(self, past: &mut Past, job: &Job) -> Result<Solved, LinearError> {
         let all = self.moved(job)?;
-        let solved = self.finished(self.step.name.clone(), &all)?;
+        let solved = self.finish_step(&all)?;
         past.displacements = all;
         past.stresses.clone_from(&solved.stresses);
         Ok(solved)
     }
 
-    /// What these displacements of every unknown are to who asked.
-    pub(super) fn finished(&self, name: String, all: &[f64]) -> Result<Solved, LinearError> {
-        Ok(self.told(name, all, self.stresses(all)?))
-    }
-
-    /// The same with its stresses.
-    pub(super) fn told(&self, name: String, all: &[f64], stresses: Vec<Vec<Voigt>>) -> Solved {
+    /// Displacements of the nodes that the deck names, and stresses, from those of every unknown.
+    fn finish_step(&self, all: &[f64]) -> Result<Solved, LinearError> {
         let places: Vec<DVec3> =
             all.as_chunks::<3>().0.iter().copied().map(DVec3::from_array).collect();
         let displacement = |n: u32| match self.deck.means.get(&n) {
@@ -302,14 +281,15 @@ impl<'a> System<'a> {
             Some(mean) => mean.iter().map(|&(m, share)| share * places[m as usize]).sum(),
         };
         let displacements = (0..self.deck.labels.len() as u32).map(displacement).collect();
-        let unknowns = self.free.count();
-        Solved { name, displacements, stresses, unknowns, ..Solved::default() }
+        let (name, unknowns) = (self.step.name.clone(), self.free.count());
+        let stresses = self.stresses(all)?;
+        Ok(Solved { name, displacements, stresses, unknowns, ..Solved::default() })
     }
 
     /// Displacements of every unknown.
     fn moved(&self, job: &Job) -> Result<Vec<f64>, LinearError> {
         let (matrix, mut rhs) = self.stiffness(job)?;
-        self.nodal(&self.step.forces, &mut rhs)?;
+        self.nodal(&mut rhs)?;
         let none = Constraints::new(self.free.count());
         let solution = if rhs.is_empty() {
             Vec::new()
@@ -324,7 +304,7 @@ impl<'a> System<'a> {
         Ok(self.free.expanded(&solution))
     }
 
-    pub(super) fn floating(&self) -> LinearError {
+    fn floating(&self) -> LinearError {
         LinearError::Floating { step: self.step.name.clone() }
     }
 
@@ -339,17 +319,20 @@ impl<'a> System<'a> {
         }
     }
 
-    /// The stiffness with what stresses add to it.
-    fn stiff_under(
+    /// The smallest squares of angular frequencies, with these stresses or without:
+    /// (K + K_σ − ω² M) φ = 0.
+    fn vibrating(
         &self,
+        count: usize,
         stresses: &[Vec<Voigt>],
         job: &Job,
-    ) -> Result<BlockMatrix<1>, LinearError> {
+    ) -> Result<Vec<f64>, LinearError> {
         let (mut stiffness, _) = self.stiffness(job)?;
         if !stresses.is_empty() {
             stiffness.add(1.0, &self.stress_stiffness(stresses, job)?);
         }
-        Ok(stiffness)
+        let (mass, _) = self.mass(job)?;
+        self.smallest(stiffness, &mass, count, job)
     }
 
     /// The smallest factors at which the loads of the step make the structure unstable:
@@ -394,7 +377,7 @@ impl<'a> System<'a> {
     }
 
     /// What acts on elements.
-    pub(super) fn distributed(&self) -> Result<Loads, LinearError> {
+    fn distributed(&self) -> Result<Loads, LinearError> {
         let mut loads = Loads { by_cell: HashMap::new() };
         for (&(cell, face), &value) in &self.step.pressures {
             loads.by_cell.entry(cell).or_default().0.push((face, value));
@@ -414,12 +397,8 @@ impl<'a> System<'a> {
     }
 
     /// Adds forces at nodes.
-    pub(super) fn nodal(
-        &self,
-        forces: &BTreeMap<(u32, u8), f64>,
-        rhs: &mut [f64],
-    ) -> Result<(), LinearError> {
-        for (&(node, component), &force) in forces {
+    fn nodal(&self, rhs: &mut [f64]) -> Result<(), LinearError> {
+        for (&(node, component), &force) in &self.step.forces {
             let own = [(node, 1.0)];
             let on = self.deck.shares.get(&node).map_or(&own[..], Vec::as_slice);
             for (unknown, share) in self.deck.component(node, component) {
@@ -467,11 +446,7 @@ impl<'a> System<'a> {
 }
 
 /// Every unknown by what is free.
-pub(super) fn sums(
-    deck: &Deck,
-    step: &Step,
-    equations: &[Equation],
-) -> Result<Vec<Sum>, LinearError> {
+fn sums(deck: &Deck, step: &Step, equations: &[Equation]) -> Result<Vec<Sum>, LinearError> {
     // Supports first: equations then bind what is left.
     let bound = Bound::new(equations)
         .map_err(|e| LinearError::Contradiction { step: step.name.clone(), line: e.line })?;
@@ -487,12 +462,12 @@ fn unknowns(deck: &Deck, e: usize) -> Vec<u32> {
 }
 
 /// Pressures (face, Pa) and accelerations of elements.
-pub(super) struct Loads {
+struct Loads {
     by_cell: HashMap<u32, (Vec<(u8, f64)>, Vec<DVec3>)>,
 }
 
 impl Loads {
-    pub(super) fn add(
+    fn add(
         &self,
         e: usize,
         element: &Element<'_>,
