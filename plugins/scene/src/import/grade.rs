@@ -502,7 +502,7 @@ mod tests {
             ("Beam IPE400:12345", 0, 1),
             ("W14X90", 0, 1),
             ("UB 4", 0, 0),
-            ("S355 girder", 0, 1),
+            ("S355", 0, 0),
         ] {
             let found = composition(&named(name));
             assert_eq!((found.doubts.len(), found.unknown.len()), (doubts, unknown), "{name}");

@@ -437,7 +437,7 @@ fn steel_grade(name: &str) -> Option<f32> {
     })
 }
 
-/// Whether a name is that of a rolled section, as `HEA 300` or `W14X90`, or says a steel's grade.
+/// Whether a name is that of a rolled section, as `HEA 300` or `W14X90`. S355 may be a mark.
 pub(super) fn is_rolled_steel(name: &str) -> bool {
     const SERIES: [&str; 16] = [
         "HEA", "HEB", "HEM", "HD", "HL", "HP", "IPE", "IPN", "INP", "UPN", "UPE", "UNP", "UB",
@@ -451,9 +451,7 @@ pub(super) fn is_rolled_steel(name: &str) -> bool {
                     && after(rest, "X").is_some_and(|(_, rest)| rest.is_empty())
             })
     };
-    let has_yield =
-        |token: &String| after(token, "S").is_some_and(|(mpa, _)| YIELDS.contains(&mpa));
-    tokens(name).iter().any(|token| has_yield(token) || of_series(token))
+    tokens(name).iter().any(of_series)
 }
 
 /// Bending strength, MPa, and modulus, GPa, of timber by a class in its name: `C24`, `GL28h`,
