@@ -355,7 +355,7 @@ fn a_grid_is_of_its_kind() {
         ("", "height_m,0.25\nm,mm\n0.5,35\n", "nothing says what the grid holds"),
         ("kind: Cover,", "height_m,0.25\nm,mV\n0.5,35\n", "in mm or cm"),
         ("", "height_m,0.25,0.5\nm,mV,V\n0.5,-320,-.31\n", "give them one unit"),
-        ("unit: \"V\",", "height_m,0.25\nm,mV\n0.5,-320\n", "correct one of them"),
+        ("kind: HalfCell, unit: \"V\",", "height_m,0.25\nm,mV\n0.5,-320\n", "correct one of them"),
     ] {
         let wrong = table(fields, text).problems();
         assert!(wrong.iter().any(|line| line.contains(said)), "{text}: {wrong:?}");

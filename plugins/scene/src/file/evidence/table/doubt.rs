@@ -259,29 +259,35 @@ const THIN: f64 = 6.0;
 
 /// Covers in cm or inch.
 pub(crate) fn doubt_covers(covers: &[f64]) -> Option<String> {
-    let middle = median(&mut covers.to_vec()).filter(|middle| *middle < THIN)?;
-    let most = covers.iter().copied().reduce(f64::max).unwrap_or(middle);
-    let of = match most < THIN {
-        true => format!("no cover is above {most} mm"),
-        false => format!("most covers are no more than {middle} mm"),
-    };
-    let most = if most < THIN { most } else { middle };
+    let (sizes, mm) = smaller_than(THIN, "cover is", "covers are", covers)?;
     Some(format!(
-        "{of}: in cm, {} mm, or in inches, {} mm? name the unit, \"cover [cm]\", or {CONFIRM}",
-        short(10.0 * most),
-        short(25.4 * most)
+        "{sizes}: in cm, {} mm, or in inches, {} mm? name the unit, \"cover [cm]\", or {CONFIRM}",
+        short(10.0 * mm),
+        short(25.4 * mm)
     ))
 }
 
-/// Depths in cm: none is 10, and some have decimals that nobody reads on a ruler of millimetres.
+/// Depths in cm: most are below 10, and some have decimals that are not read on a ruler.
 fn doubt_carbonation(depths: &[f64]) -> Option<String> {
-    let most = median(&mut depths.to_vec()).filter(|middle| *middle < 10.0)?;
+    let (sizes, mm) =
+        smaller_than(10.0, "depth of carbonation is", "depths of carbonation are", depths)?;
     let is_fine = |mm: &&f64| (mm.round() - **mm).abs() > 1e-9;
     (depths.iter().filter(is_fine).count() > 1).then(|| {
         format!(
-            "most depths of carbonation are no more than {most} mm, and they have decimals: in cm, {} mm? name the unit, \"carbonation [cm]\", or {CONFIRM}",
-            short(10.0 * most)
+            "{sizes}, and they have decimals: in cm, {} mm? name the unit, \"carbonation [cm]\", or {CONFIRM}",
+            short(10.0 * mm)
         )
+    })
+}
+
+/// What is said of lengths of which the middle one is smaller than a limit, mm, and the length to
+/// show: the largest, or the middle one where the largest is no smaller than the limit.
+fn smaller_than(limit: f64, one: &str, many: &str, lengths: &[f64]) -> Option<(String, f64)> {
+    let middle = median(&mut lengths.to_vec()).filter(|middle| *middle < limit)?;
+    let most = lengths.iter().copied().fold(middle, f64::max);
+    Some(match most < limit {
+        true => (format!("no {one} above {most} mm"), most),
+        false => (format!("most {many} no more than {middle} mm"), middle),
     })
 }
 
