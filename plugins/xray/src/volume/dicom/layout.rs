@@ -124,11 +124,12 @@ impl<F: Read + Seek> Walk<'_, F> {
         if !kind.iter().all(u8::is_ascii_uppercase) {
             return Err(format!("is damaged DICOM: no element begins at byte {}", self.at - 6));
         }
-        let long: [&[u8; 2]; 13] = [
-            b"OB", b"OD", b"OF", b"OL", b"OV", b"OW", b"SQ", b"SV", b"UC", b"UN", b"UR", b"UT",
-            b"UV",
+        // All others, also those that nobody knows yet, have long ones (PS3.5, 6.2.2).
+        let short: [&[u8; 2]; 21] = [
+            b"AE", b"AS", b"AT", b"CS", b"DA", b"DS", b"DT", b"FD", b"FL", b"IS", b"LO", b"LT",
+            b"PN", b"SH", b"SL", b"SS", b"ST", b"TM", b"UI", b"UL", b"US",
         ];
-        if long.contains(&&kind) {
+        if !short.contains(&&kind) {
             self.short(syntax.is_big)?;
             return Ok((kind, self.number(syntax.is_big)?));
         }
