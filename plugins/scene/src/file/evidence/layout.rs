@@ -1,7 +1,7 @@
 //! Where the parts of a table's text are: what stands above its header, the header, rows of units
 //! below it. What is no row is blanked, so that lines keep their numbers.
 
-use intrados_stage::sheet::{self, DecimalMark};
+use intrados_stage::sheet;
 
 use super::table::{is_deciding, is_grid_head, is_known};
 use crate::problem::Problem;
@@ -69,11 +69,8 @@ fn rows_behind_marks(
     separator: u8,
 ) -> Option<String> {
     let has_numbers = |line: &str| {
-        cells(line, separator).iter().skip(1).any(|cell| {
-            [DecimalMark::Point, DecimalMark::Comma]
-                .into_iter()
-                .any(|mark| sheet::number(cell, mark).is_some())
-        })
+        let is_number = |cell: &String| sheet::number(cell, sheet::own_mark(cell)).is_some();
+        cells(line, separator).iter().skip(1).any(is_number)
     };
     let below = comments.iter().filter(|(line, text)| *line > header && has_numbers(text));
     let found: Vec<&(usize, &str)> = below.collect();

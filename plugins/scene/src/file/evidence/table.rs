@@ -23,7 +23,7 @@ mod doubt;
 mod grid;
 
 pub(super) use doubt::{doubt_covers, doubt_profile};
-use grid::place_across;
+use grid::is_place_across;
 
 /// Most rows of a table.
 const MAX_ROWS: usize = 200_000;
@@ -131,7 +131,7 @@ pub(super) fn is_grid_head(cells: &[String]) -> bool {
         matches!(column, Some(Column::Height | Column::Along))
     };
     let Some((first, rest)) = cells.split_first() else { return false };
-    is_along(first) && !rest.is_empty() && rest.iter().all(|cell| place_across(cell).is_some())
+    is_along(first) && !rest.is_empty() && rest.iter().all(|cell| is_place_across(cell))
 }
 
 impl Column {
@@ -537,7 +537,7 @@ impl<'a> Table<'a> {
         if is_logged && (self.survey.kind.is_none() && self.survey.unit.is_some()) {
             return others.next().is_some();
         }
-        let is_number = |(_, name): (usize, &str)| place_across(name).is_some();
+        let is_number = |(_, name): (usize, &str)| is_place_across(name);
         let mut full = others.clone().filter(|(_, name)| !name.is_empty());
         let is_grid = (has(Column::Height) || has(Column::Along))
             && full.clone().next().is_some()

@@ -100,10 +100,7 @@ pub(super) fn leave_out(table: &Table, rows: &mut Vec<Row>) -> Result<Option<Str
         rows.retain(|row| !lines.contains(&row.line));
     }
     let Some((line, cell)) = found.first() else { return Ok(None) };
-    let more = match found.len() {
-        1 => String::new(),
-        n => format!(" and {} more like it", n - 1),
-    };
+    let more = more_like_it(found.len());
     let message = format!(
         "{}:{line}: {cell}{more} not used: instruments write it where they measured nothing; take it out, or {CONFIRM}",
         table.file
@@ -111,6 +108,14 @@ pub(super) fn leave_out(table: &Table, rows: &mut Vec<Row>) -> Result<Option<Str
     match rows.is_empty() {
         true => Err(Problem::error(table.file, "NOTHING_MEASURED", message)),
         false => Ok(Some(message)),
+    }
+}
+
+/// Behind the first of `count`.
+fn more_like_it(count: usize) -> String {
+    match count {
+        1 => String::new(),
+        n => format!(" and {} more like it", n - 1),
     }
 }
 
@@ -166,38 +171,40 @@ fn median(values: &mut [f64]) -> Option<f64> {
 /// Potential below which its sign is doubted, mV: steel in dry concrete shows little more.
 const POSITIVE: f64 = 50.0;
 
-/// Refuses potentials most of which are not negative.
+/// A potential, mV.
+fn potential(record: &Placed<Record>) -> Option<f64> {
+    match record.what.shows {
+        Finding::HalfCell { mv, .. } => Some(mv),
+        _ => None,
+    }
+}
+
+/// Whether a record is a potential that seems to have lost its sign.
+fn is_unsigned(record: &Placed<Record>) -> bool {
+    potential(record).is_some_and(|mv| mv > POSITIVE)
+}
+
+/// Refuses potentials of which as many seem to have lost their sign as have one.
 pub(super) fn sign_lost(table: &Table, out: &Rows) -> Option<Problem> {
-    let (lost, others) = signs(out);
-    let first = lost.first().filter(|_| !table.survey.confirmed && lost.len() >= others)?;
-    let Finding::HalfCell { mv, .. } = first.what.shows else { return None };
-    let of = match others {
+    let first = out.records.iter().find(|record| is_unsigned(record))?;
+    let lost = out.records.iter().filter(|record| is_unsigned(record)).count();
+    let negative = out.records.iter().filter_map(potential).filter(|mv| *mv < 0.0).count();
+    let mv = potential(first).filter(|_| !table.survey.confirmed && lost >= negative)?;
+    let of = match negative {
         0 => "none of the table is negative".to_owned(),
-        _ => format!("{} of {} of the table are not negative", lost.len(), lost.len() + others),
+        _ => format!("{lost} of {} of the table are above {POSITIVE} mV", out.records.len()),
     };
     let message = format!("{mv} mV, and {of}: was the sign lost? write -{mv}, or {CONFIRM}");
     Some(Problem::error(first.field("mV"), "SIGN", message))
 }
 
-/// Potentials that seem to have lost their sign, and how many have one.
-fn signs(out: &Rows) -> (Vec<&Placed<Record>>, usize) {
-    let of = |fits: fn(f64) -> bool| move |record: &&Placed<Record>| matches!(record.what.shows, Finding::HalfCell { mv, .. } if fits(mv));
-    let lost = out.records.iter().filter(of(|mv| mv > POSITIVE)).collect();
-    (lost, out.records.iter().filter(of(|mv| mv < 0.0)).count())
-}
-
 /// Takes out the few potentials of a table that seem to have lost their sign; says which.
 pub(super) fn leave_out_unsigned(table: &Table, out: &mut Rows) -> Option<String> {
-    if table.survey.confirmed {
-        return None;
-    }
-    let (lost, _) = signs(out);
-    let first = lost.first()?;
-    let Finding::HalfCell { mv, .. } = first.what.shows else { return None };
-    let (place, n) = (first.place.clone(), lost.len());
-    let lost: HashSet<String> = lost.iter().map(|record| record.what.name.clone()).collect();
-    out.records.retain(|record| !lost.contains(&record.what.name));
-    let more = if n == 1 { String::new() } else { format!(" and {} more like it", n - 1) };
+    let first = out.records.iter().find(|record| is_unsigned(record));
+    let first = first.filter(|_| !table.survey.confirmed)?;
+    let (place, mv, before) = (first.place.clone(), potential(first)?, out.records.len());
+    out.records.retain(|record| !is_unsigned(record));
+    let more = more_like_it(before - out.records.len());
     Some(format!(
         "{place}: {mv} mV{more} not used among potentials below 0: was the sign lost? write -{mv}, or {CONFIRM}"
     ))

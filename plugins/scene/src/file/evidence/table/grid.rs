@@ -1,25 +1,21 @@
 //! Grids, as meters of potential and cover write them: a place along the axis a row, a place across
 //! the face a column.
 
-use intrados_stage::sheet::{self, DecimalMark};
+use intrados_stage::sheet;
 
 use super::{Column, Holds, Kind, Layout, Problem, Table, doubt::is_gap, shorten, unit};
 use crate::file::evidence::units::split_unit;
 
-/// A place across a face, as the header of a grid tells it.
-pub(super) fn place_across(name: &str) -> Option<f64> {
-    let base = split_unit(name).0;
-    let base = base.trim_end_matches(['m', ' ']);
-    [DecimalMark::Point, DecimalMark::Comma]
-        .into_iter()
-        .find_map(|mark| sheet::number(base, mark))
-        .map(|number| number.value)
+/// Whether a name is a place across a face, as the header of a grid has it.
+pub(super) fn is_place_across(name: &str) -> bool {
+    let base = split_unit(name).0.trim_end_matches(['m', ' ']);
+    sheet::number(base, sheet::own_mark(base)).is_some()
 }
 
 impl Table<'_> {
     /// Whether the columns that hold values are named by their places.
     pub(super) fn is_grid(&self) -> bool {
-        let is_place = |name: &str| name.is_empty() || place_across(name).is_some();
+        let is_place = |name: &str| name.is_empty() || is_place_across(name);
         !self.channels.is_empty()
             && self.channels.iter().all(|channel| is_place(&channel.name))
             && !self.has(Column::Date)
